@@ -69,12 +69,12 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
         layer, lengths_mm = program.remarks.layer, deposited.length_mm[np.searchsorted(deposited.rows, mine)]
         laid_mm = np.bincount(layer[program.remark[mine]], weights=lengths_mm)
         hangs = (gap < SEEN_SHARE * program.remarks.height_mm[remark]) | in_air
-        told = np.flatnonzero((laid_mm > CRUMB_MM)[layer[remark]] & hangs)
-        if len(told):
+        gaps = np.flatnonzero((laid_mm > CRUMB_MM)[layer[remark]] & hangs)
+        if len(gaps):
             seen.add(part)
-            row, layers = int(high[told[0]]), len(np.unique(layer[remark[told]]))
+            row, layers = int(high[gaps[0]]), len(np.unique(layer[remark[gaps]]))
             message = (
-                f"layer {layer[program.remark[row]]} begins {gap[told[0]]:.2f} mm above all that lies below it: it should lie on "
+                f"layer {layer[program.remark[row]]} begins {gap[gaps[0]]:.2f} mm above all that lies below it: it should lie on "
                 f"it (layers: {layers})"
             )
             problems.append(at_row(program, row, "error", "gap", message))
@@ -82,7 +82,7 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
 
 
 @kernel
-def _gaps(ends: tuple[Floats, Floats], rows: Indices, remarks: Indices32, told: Remarks, support: NDArray[np.bool_]) -> Floats:
+def _gaps(ends: tuple[Floats, Floats], rows: Indices, remarks: Indices32, stated: Remarks, support: NDArray[np.bool_]) -> Floats:
     """(m,) excessive height of the underside of each bead of a part above all earlier layers, else 0; support keeps its distance.
 
     Its own layer does not count: support printed first would hide a layer that is raised with it.
@@ -91,7 +91,7 @@ def _gaps(ends: tuple[Floats, Floats], rows: Indices, remarks: Indices32, told: 
     highest = of_part = before = part_before = -np.inf
     for k in range(len(rows)):
         row = rows[k]
-        a, b, height_mm, its_layer = ends[0][row, 2], ends[1][row, 2], told.height_mm[remarks[row]], told.layer[remarks[row]]
+        a, b, height_mm, its_layer = ends[0][row, 2], ends[1][row, 2], stated.height_mm[remarks[row]], stated.layer[remarks[row]]
         top = max(a, b)
         if k == 0 or top - last_mm < -NEW_OBJECT_MM:
             highest, of_part, before, part_before = -np.inf, -np.inf, np.inf, np.inf

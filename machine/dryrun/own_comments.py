@@ -105,18 +105,18 @@ def _missing(program: ParsedProgram, printed: set[int]) -> list[Finding]:
         return []
     line = int(program.line[-1]) if len(program.line) else 0
     names = f"part {absent[0]}" if len(absent) == 1 else f"parts {', '.join(map(str, absent[:10]))}"
-    message = f"nothing of {names} is printed: the file tells of {program.announced} parts, beads are laid of {len(printed)}"
+    message = f"nothing of {names} is printed: the file announces {program.announced} parts, only {len(printed)} have beads"
     return [Finding("error", "missing", line, absent[0], 0, message)]
 
 
 def _of_part(program: ParsedProgram, rows: NDArray[np.int64], layers: int, totals: PartTotals) -> Iterator[Finding]:
     """Differences of a part in layers, filament and position."""
     if layers != totals.layers:
-        message = f"beads are laid in {layers} layers of part {totals.part}, the file tells of {totals.layers}"
+        message = f"beads are laid in {layers} layers of part {totals.part}, the file states {totals.layers}"
         yield at_row(program, int(rows[-1]), "error", "contents", message)
     pushed = float(program.e_mm[rows].sum())
     if abs(pushed - totals.filament_mm) > max(FILAMENT_MM, FILAMENT_SHARE * totals.filament_mm):
-        message = f"part {totals.part} pushes {pushed:.2f} mm of filament, the file tells of {totals.filament_mm:.2f} mm"
+        message = f"part {totals.part} pushes {pushed:.2f} mm of filament, the file states {totals.filament_mm:.2f} mm"
         yield at_row(program, int(rows[0]), "error", "contents", message)
     bounds = np.transpose([_extent(program, rows, axis) for axis in range(3)])
     apart = bounds - totals.bounds_mm
@@ -128,7 +128,7 @@ def _of_part(program: ParsedProgram, rows: NDArray[np.int64], layers: int, total
     shifted = bool(np.abs(apart[0] - apart[1]).max() <= PLACE_MM)  # both sides are shifted alike
     moved = f"lies {abs(apart[side, axis]):.2f} mm aside" if shifted else "reaches"
     laid, recorded = (f"{'XYZ'[axis]}{corners[side, axis]:.3f}" for corners in (bounds, totals.bounds_mm))
-    message = f"part {totals.part} {moved} to {laid}, the file tells of {recorded} ({PLACE_MM:g} mm are allowed)"
+    message = f"part {totals.part} {moved} to {laid}, the file states {recorded} ({PLACE_MM:g} mm are allowed)"
     yield at_row(program, int(rows[0] if shifted else rows[extreme]), "error", "contents", message)
 
 

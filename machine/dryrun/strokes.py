@@ -205,7 +205,7 @@ def strokes_of(program: ParsedProgram) -> Strokes:
 
 @kernel
 def _along(start: Floats, end: Floats, extruded: NDArray[np.bool_]) -> tuple[Indices32, Floats]:
-    """path and way of Strokes."""
+    """Columns path and way of Strokes."""
     path, way, paths, way_mm = np.empty(len(start), np.int32), np.empty(len(start)), 0, 0.0
     for row in range(len(start)):
         same_path = extruded[row] and extruded[row - 1] and goes_on(start, end, row)

@@ -92,8 +92,8 @@ def settings_report(command: str, settings: SimulatedSettings) -> list[str]:
     """The lines that answer a command without words; [] for one without such an answer."""
     lines = _lines(settings)
     if command == "M503":
-        told = ("echo:; Linear Units:", "echo:  G21 ; (mm)")
-        return [*told, *(line for name, heading in HEADINGS.items() for line in _under(heading, lines[name]))]
+        units = ("echo:; Linear Units:", "echo:  G21 ; (mm)")
+        return [*units, *(line for name, heading in HEADINGS.items() for line in _under(heading, lines[name]))]
     return lines.get(command, [])
 
 

@@ -52,7 +52,7 @@ PART = re.compile(r"PART: *([0-9]{1,6})(?: of ([0-9]{1,6}))?.*")
 
 
 class LineText(NamedTuple):
-    """command: as sent, "" for none; comment: the text after its `;`."""
+    """A line of G-code. command: as sent, "" for none; comment: the text after its `;`."""
 
     command: str
     comment: str

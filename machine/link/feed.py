@@ -35,7 +35,7 @@ NEAR = 0.1  # mm or deg: M114 reports hundredths, motor steps are smaller
 
 
 class Feed:
-    """run() streams a program over a greeted exchange; handle_event() and handle_turn() are the exchange's callbacks.
+    """A program in print: run() streams it over a greeted exchange, whose callbacks are handle_event() and handle_turn().
 
     limit: characters of a line that the firmware keeps; total: commands of the program, None: unknown.
     """

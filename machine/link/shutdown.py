@@ -179,7 +179,7 @@ class HeaterGuard:
         self._released = True
 
     def switch_off(self, timeout_s: float = SETTLE_S, waits: bool = True) -> Heaters:
-        """heaters_off() for the exchange's printer. waits: for the end of homing."""
+        """Switch off the heaters of the exchange's printer by heaters_off(). waits: for the end of homing."""
         self._began, exchange = True, self._exchange
         try:
             heaters = heaters_off(exchange.wire, exchange.medium, timeout_s, waits and exchange.waits, self._on_turn)

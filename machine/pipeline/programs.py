@@ -49,7 +49,7 @@ def load_program(request: ModelRequest, pictures: bool = False) -> LoadedProgram
     lines = read_gcode_lines(source)
     profile, sections = read_embedded_profile(lines, request.profile, request.chosen_sections)
     if sections:
-        say(f"{request.name}: {in_words(sections, profile)}, as the file itself tells")
+        say(f"{request.name}: {in_words(sections, profile)}, as the file itself says")
     compilers.wait_for(compilers.DRY_RUN)
     known = "machine" in request.chosen_sections or profile.machine is not request.profile.machine
     return LoadedProgram(request.name, Program(lines, dry_run(lines, profile), None), profile, source, known)

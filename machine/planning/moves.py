@@ -19,7 +19,7 @@ RICHER = 1.004  # greatest ratio of a short stroke's filament to the planned, du
 
 @dataclass(frozen=True)
 class BeginPart:
-    """Begin of part `index` at `pose`; a Reorient has already turned the table.
+    """Start of part `index` at `pose`; a Reorient has turned the table before.
 
     unsupported: places of it without possible support.
     """
@@ -32,7 +32,7 @@ class BeginPart:
 
 @dataclass(frozen=True)
 class BeginLayer:
-    """Begin of a layer; z_mm is relative to the part's base plane, or to the build plate below its raft, nozzle_add_c to the
+    """Start of a layer; z_mm is relative to the part's base plane, or to the build plate below its raft, nozzle_add_c to the
     material's."""
 
     part: int

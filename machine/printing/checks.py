@@ -120,7 +120,7 @@ def check_idle(server: str, status: PrintStatus) -> None:
     if status.state.is_printing:
         raise ServerError(f"{server} is {status.state} {status.file or 'a file'} now: ask it when that is done")
     if status.state is PrintState.OFFLINE:
-        raise ServerError(f"{server} cannot tell its settings now: {status.message or 'its printer is not connected'}")
+        raise ServerError(f"{server} cannot report its settings now: {status.message or 'its printer is not connected'}")
 
 
 def firmware_mismatch(answer: Answer | None, machine: Machine) -> str:

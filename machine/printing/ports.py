@@ -80,7 +80,7 @@ def _words(answer: Answer) -> dict[str, str]:
     words = answer.words[:60]
     usual = answer.words.startswith(("processing", "paused for", "busy")) or not words
     work = "it heats, moves or waits for a person" if usual else words
-    stranger = "it sends back what it is told" if answer.words in ECHO else f"it says {words!r}"
+    stranger = "it sends back what it receives" if answer.words in ECHO else f"it says {words!r}"
     return {"words": words, "work": work, "stranger": stranger, "firmware": answer.firmware, "revival": answer.revival}
 
 

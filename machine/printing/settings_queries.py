@@ -34,7 +34,7 @@ QUESTIONS = {
     "grblHAL": ("$I", "$$"),
 }
 OTHERWISE = {
-    "Klipper": f"Klipper tells its settings over the network, to {option('port')} moonraker:HOST, and in its file printer.cfg",
+    "Klipper": f"Klipper reports its settings over the network, to {option('port')} moonraker:HOST, and in its file printer.cfg",
 }
 
 

@@ -65,7 +65,7 @@ class _Direction:
 
 
 class Cable:
-    """exchange() is one turn: the host's bytes reach the firmware, it works, its answers return.
+    """Cable with faults; exchange() is one turn: the host's bytes reach the firmware, it works, its answers return.
 
     now_s is the cable's own clock, for delays, stalls and disconnections; speed: seconds of the firmware per second of it, inf:
     the firmware's clock skips every wait.

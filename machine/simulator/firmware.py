@@ -26,7 +26,7 @@ MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_
 
 
 class SimulatedFirmware:
-    """receive() delivers bytes, advance() lets time pass and returns the printer's output.
+    """Simulated firmware; receive() delivers bytes, advance() lets time pass and returns the printer's output.
 
     kept_moves: number of moves to record, None: all. watch: gets each line's count before it begins; True: advance() returns
     first. table: the surface for its probe, None: no probe.

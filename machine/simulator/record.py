@@ -17,7 +17,7 @@ from profiles.machine import Machine
 
 @dataclass(frozen=True, eq=False)
 class Record:
-    """n executed moves in order, including those still planned; homing is an event, not a move."""
+    """Record of n executed moves in order, including those still planned; homing is an event, not a move."""
 
     machine: Machine
     start: Floats  # (n, 6) machine X Y Z mm, tilt turn deg, filament mm (running total)

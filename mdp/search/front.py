@@ -192,4 +192,4 @@ def _savings_notes(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
         price = f"but take {longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f"but take {longer_s:.0f} s longer"
     elif more_mm >= 50.0:
         price = f"but take {more_mm / 1000.0:.1f} m more filament"
-    return (f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm² of scars {price}: {advice('parts', parts)}",)
+    return (f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm² of blemishes {price}: {advice('parts', parts)}",)

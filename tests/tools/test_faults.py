@@ -38,7 +38,7 @@ def printed(lines: list[str]) -> VirtualPrinter:
 
 @pytest.mark.parametrize(("executed", "words"), [
     (lambda text: [*text[:20], text[19], *text[20:]], "stroke 17 is not the program's"),
-    (lambda text: [*text[:20], *text[21:]], "strokes although no error was told"),
+    (lambda text: [*text[:20], *text[21:]], "strokes without an error"),
     (lambda text: [*text[:20], text[21], text[20], *text[22:]], "stroke 17 is not the program's"),
     (lambda text: [*text[:-3], text[-4], *text[-3:]], "stroke 33 is not the program's"),
 ])  # fmt: skip
@@ -57,7 +57,7 @@ def test_heaters_left_on_and_an_error_of_another_kind_are_seen() -> None:
 
 
 @pytest.mark.parametrize(("instead", "words"), [
-    ("M105", "72 of 73 strokes although no error was told"), ("G1 X1 Y1 E0.5", "stroke 47 is not the program's")])  # fmt: skip
+    ("M105", "72 of 73 strokes without an error"), ("G1 X1 Y1 E0.5", "stroke 47 is not the program's")])  # fmt: skip
 def test_a_sender_that_repeats_something_else_is_caught(monkeypatch: pytest.MonkeyPatch, instead: str, words: str) -> None:
     repeat = Window.repeat
     monkeypatch.setattr(Window, "repeat", lambda window, number, now_s: repeat(window, number, now_s) and frame(number, instead))

@@ -171,9 +171,9 @@ def trial(seeds: list[tuple[str, bytes]], read: Callable[[Path], object], scratc
     return Trial(number, suffix, CODES.get(code, LIMITED), took_s, text[-1500:])
 
 
-def _try(read: Callable[[Path], object], file: Path, told: Path) -> int:
+def _try(read: Callable[[Path], object], file: Path, report: Path) -> int:
     """Read a file; returns the exit code, and writes the message to a file."""
-    with told.open("w") as said:
+    with report.open("w") as said:
         os.dup2(said.fileno(), 2)
         try:
             read(file)

@@ -150,7 +150,7 @@ def order(record: Record, strokes: np.ndarray, whole: bool) -> list[str]:
     pushed = record.end[:, 5] - record.start[:, 5]
     got = np.column_stack([record.end[:, :2], pushed])[pushed > 1e-9]
     if whole and len(got) != len(strokes):
-        return [f"{len(got)} of {len(strokes)} strokes although no error was told"]
+        return [f"{len(got)} of {len(strokes)} strokes without an error"]
     if len(got) > len(strokes):
         return [f"{len(got)} strokes, the program has {len(strokes)}"]
     far = np.abs(got - strokes[: len(got)]).max(axis=1) > 1e-6

@@ -89,8 +89,8 @@ def summary(verdicts: list[dict[str, str]]) -> str:
     lines = []
     for of_file in verdicts:
         counts = Counter(of_file.values())
-        told = ", ".join(f"{name} {counts[name]}" for name in VERDICTS)
-        lines.append(f"{told}: {counts['person'] / len(of_file):.0%} of {len(of_file)}")
+        shares = ", ".join(f"{name} {counts[name]}" for name in VERDICTS)
+        lines.append(f"{shares}: {counts['person'] / len(of_file):.0%} of {len(of_file)}")
     common = sorted(set.intersection(*map(set, verdicts)))
     if len(verdicts) > 1 and common:
         agreed = sum(len({of_file[sheet] for of_file in verdicts}) == 1 for sheet in common)

@@ -210,7 +210,7 @@ def main() -> None:
         "Z wrong by at most, mm": lambda mine: f"{max(result.off_mm for result in mine):.2f}",
     }
     results = campaign(given.moments, given.seed, build, given.power)
-    print(table(results, "what the journal told", lambda result: result.how, columns))
+    print(table(results, "state of the journal", lambda result: result.how, columns))
 
 
 if __name__ == "__main__":

@@ -39,8 +39,8 @@ def rows(file: Path, maps: Path | None) -> Iterator[Sequence[object]]:
     run, profile = played(file)
     for face in interfaces(run.program, run.deposited, profile):
         ratio = balance_map(face)
-        told = ratio[np.isfinite(ratio)]
-        over, under = (float(bad.sum()) / max(len(told), 1) for bad in (told > MOST, told < LEAST))
+        ratios = ratio[np.isfinite(ratio)]
+        over, under = (float(bad.sum()) / max(len(ratios), 1) for bad in (ratios > MOST, ratios < LEAST))
         held, inside = wall_edges(face)
         sums = balance_of(face)
         shares = (sums.over_room, over, under)
@@ -56,9 +56,9 @@ def picture(face: Interface) -> np.ndarray:
     ratio = balance_map(face)
     image = np.full((*ratio.shape, 3), 255.0)
     image[face.section] = GREY
-    told = np.isfinite(ratio)
-    off = np.clip((ratio[told] - 1.0) / FULL, -1.0, 1.0)[:, None]
-    image[told] = np.where(off > 0, WHITE + off * (RED - WHITE), WHITE - off * (BLUE - WHITE))
+    known = np.isfinite(ratio)
+    off = np.clip((ratio[known] - 1.0) / FULL, -1.0, 1.0)[:, None]
+    image[known] = np.where(off > 0, WHITE + off * (RED - WHITE), WHITE - off * (BLUE - WHITE))
     image[face.section & face.touching & ~face.bead] *= 0.6
     return np.ascontiguousarray(image.transpose(1, 0, 2)[::-1]).astype(np.uint8)
 

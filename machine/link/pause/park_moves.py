@@ -168,7 +168,7 @@ def return_moves(profile: Profile, printed: Printed, way: Turn) -> list[str]:
 
 
 def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequence[str]) -> list[str]:
-    """return_moves() for a firmware that lost its position: set the axes, run `heat`, lift the tip, home X and Y.
+    """Way back for a firmware that lost its position: set the axes, run `heat`, lift the tip, home X and Y, return_moves().
 
     machine.gcode.resume replaces the homing if the profile has it. Raises JournalError, MoveError, ProfileError.
     """

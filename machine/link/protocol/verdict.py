@@ -36,7 +36,7 @@ def no_line_numbers() -> PrinterError:
     """The error for a printer that answers only lines without numbers."""
     return PrinterError(
         "the printer answers M115, but neither M110 nor any line with a number and a checksum: this program sends no other "
-        "lines, for a damaged one could not be told"
+        "lines, for a damaged one could not be detected"
     )
 
 

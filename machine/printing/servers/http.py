@@ -68,7 +68,7 @@ def how_to_give_a_key(address: Server) -> str:
 
 
 class HttpSession:
-    """get() and post() below a server's address, from any thread.
+    """Session for requests below a server's address, from any thread.
 
     Raises ServerError with a sentence for the user, NoAnswerError when the request may have been accepted. key: "" for none;
     ca_file: None: this computer's trusted authorities. key_header: header that carries the key; key_refused: statuses that mean a
@@ -201,7 +201,7 @@ class HttpSession:
         return plain(self._without_key(str(error or "")))
 
 
-def picture_address(told: object, server: Server) -> str:
+def picture_address(reported: object, server: Server) -> str:
     """URL of a picture on the server's own host; "" if there is none or it is on another host.
 
     A server's answer must not make this computer contact other hosts.
@@ -211,7 +211,7 @@ def picture_address(told: object, server: Server) -> str:
     'http://printer.local/webcam/?action=snapshot'
     """
     try:
-        parts = urlsplit(told if isinstance(told, str) else "")
+        parts = urlsplit(reported if isinstance(reported, str) else "")
         host, port = parts.hostname, parts.port
     except ValueError:
         return ""

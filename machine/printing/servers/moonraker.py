@@ -79,8 +79,8 @@ class Moonraker(PrintServer):
     def webcam(self) -> str:
         reply = self.get("/server/webcams/list")
         cameras = table(table(reply.json()).get("result")).get("webcams") if reply.status == 200 else None
-        told = (table(camera) for camera in cameras) if isinstance(cameras, list) else ()
-        pictures = (picture_address(camera.get("snapshot_url"), self.address) for camera in told if camera.get("enabled", True))
+        tables = (table(camera) for camera in cameras) if isinstance(cameras, list) else ()
+        pictures = (picture_address(camera.get("snapshot_url"), self.address) for camera in tables if camera.get("enabled", True))
         return next(filter(None, pictures), "")
 
     def status(self) -> PrintStatus:
@@ -116,7 +116,7 @@ class Moonraker(PrintServer):
         /server/files/metadata answers 404 for a file not scanned yet (file_manager.py, _handle_metadata_request).
         """
         reply = self.get("/server/files/directory", {"path": "gcodes"})
-        files = table(table(self._value(reply, "to tell of its files")).get("result")).get("files")
+        files = table(table(self._value(reply, "to list its files")).get("result")).get("files")
         return any(table(item).get("filename") == file for item in files) if isinstance(files, list) else False
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
@@ -155,7 +155,7 @@ class Moonraker(PrintServer):
 
     def _query(self, names: tuple[str, ...]) -> Mapping[str, Any]:
         reply = self.post("/printer/objects/query", {"objects": dict.fromkeys(names)})
-        return table(table(table(self._value(reply, "to tell of its printer")).get("result")).get("status"))
+        return table(table(table(self._value(reply, "to report its printer")).get("result")).get("status"))
 
     def _get(self, path: str) -> Any:
         return table(self._value(self.get(path), "to say who it is")).get("result")

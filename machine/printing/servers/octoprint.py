@@ -53,10 +53,10 @@ class OctoPrint(PrintServer):
 
     def status(self) -> PrintStatus:
         """Status from /api/job, and from /api/printer while a printer is connected."""
-        job = table(self._get("/api/job", "to tell of its print"))
+        job = table(self._get("/api/job", "to report its print"))
         progress, file = table(job.get("progress")), table(table(job.get("job")).get("file"))
         reply = self.get("/api/printer", {"exclude": "sd"})
-        printer = {} if reply.status == 409 else table(self.check(reply, "to tell of its printer"))
+        printer = {} if reply.status == 409 else table(self.check(reply, "to report its printer"))
         heaters, done = table(printer.get("temperature")), number(progress.get("completion"))
         return PrintStatus(
             _phase(table(table(printer.get("state")).get("flags")), progress),
@@ -70,7 +70,7 @@ class OctoPrint(PrintServer):
 
     def has(self, file: str) -> bool:
         reply = self.get(f"/api/files/local/{file}")
-        return reply.status != 404 and self.check(reply, "to tell of its files") is not None
+        return reply.status != 404 and self.check(reply, "to list its files") is not None
 
     def upload(self, upload: GcodeUpload, sent: Sent) -> str:
         """Upload a file; returns the name chosen by the server."""

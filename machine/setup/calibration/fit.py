@@ -215,7 +215,7 @@ def _best(machine: Machine, touches: Sequence[Touch], mark_height_mm: float, dir
     if best[second][0] < APART**2 * cost + LEAST_MM**2:
         axis = machine.tilt if SIGNS[first][0] != SIGNS[second][0] else machine.turn
         raise ProfileError(
-            f"the touches do not tell the sign of {axis.letter}: touch the mark at turns 0, 90, 180 and 270 and at two tilts"
+            f"the touches do not determine the sign of {axis.letter}: touch the mark at turns 0, 90, 180 and 270 and at two tilts"
         )
     return signed[first], numbers
 
@@ -249,7 +249,7 @@ def _sigma(residuals: Callable[[Floats], Floats], numbers: Floats) -> dict[str, 
         lost = np.abs(directions[-1])
         names = dict.fromkeys(name for name, share in zip(sought, lost, strict=True) if share > 0.3 * lost.max())
         unknown = " and ".join(names)
-        raise ProfileError(f"the touches do not tell {unknown}: touch the mark at four turns and at two more tilts")
+        raise ProfileError(f"the touches do not determine {unknown}: touch the mark at four turns and at two more tilts")
     off = residuals(numbers)
     variance = float(off @ off) / max(1, len(off) - len(numbers))
     spread = np.sqrt(np.diag((directions.T / sizes**2) @ directions) * variance)
@@ -278,7 +278,7 @@ def _check_sound(machine: Machine, calibrated: Machine) -> None:
 def _check_count(touches: Sequence[Touch], sought: int) -> None:
     coordinates = sum(1 if touch.on_plate else 3 for touch in touches)
     if coordinates < sought:
-        raise ProfileError(f"{len(touches)} touches tell {coordinates} numbers, {sought} are sought: touch the mark more often")
+        raise ProfileError(f"{len(touches)} touches determine {coordinates} numbers, {sought} are sought: add more touches")
     tilts = {round(touch.pose.tilt_deg, 1) for touch in touches}
     if len(tilts) < 2:
         raise ProfileError(f"all touches are at tilt {tilts.pop():g}: the tilt axis is found from two tilts or more")

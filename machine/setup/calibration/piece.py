@@ -75,8 +75,8 @@ class Piece:
         return slope_of(lambda changes: _explained(self.machine, [self], changes), np.zeros(len(UNKNOWN)))
 
     def _error_mm(self, true: Machine, pad: Pad, pose: Pose) -> Floats:
-        told = machine_points(self.machine, pose, pad.middle_mm[None])
-        error: Floats = workpiece_points(true, pose, told)[0] - pad.middle_mm
+        aimed = machine_points(self.machine, pose, pad.middle_mm[None])
+        error: Floats = workpiece_points(true, pose, aimed)[0] - pad.middle_mm
         return error
 
 
@@ -128,9 +128,7 @@ def parse_readings(text: str) -> Floats:
     """
     pads = text.split()
     if len(pads) != PADS:
-        raise ProfileError(
-            f"{option('readings')} {text!r} tells of {len(pads)} pads: {PADS} are expected, with a space between them"
-        )
+        raise ProfileError(f"{option('readings')} {text!r} has {len(pads)} pads: {PADS} are expected, with a space between them")
     return np.array([parse_pad(pad, number) for number, pad in enumerate(pads, start=1)])
 
 
@@ -152,8 +150,8 @@ def parse_pad(text: str, number: int) -> list[float]:
 
 def readings_text(readings_mm: Floats) -> str:
     """The text from which `parse_readings` makes these readings."""
-    told = (readings_mm + np.array([0.0, 0.0, HEIGHT_MM])) / np.array([MARK_MM, MARK_MM, 1.0])
-    words = [[NOT_READ if isnan(value) else f"{round(value, 3) + 0.0:g}" for value in pad] for pad in told.tolist()]
+    marks = (readings_mm + np.array([0.0, 0.0, HEIGHT_MM])) / np.array([MARK_MM, MARK_MM, 1.0])
+    words = [[NOT_READ if isnan(value) else f"{round(value, 3) + 0.0:g}" for value in pad] for pad in marks.tolist()]
     return " ".join(map(",".join, words))
 
 
@@ -187,7 +185,7 @@ def correct(machine: Machine, pieces: Sequence[Piece], readings_mm: Floats) -> C
     """The machine that explains (pieces, pads, 3) readings, nan for missing ones. Raises ProfileError for too few."""
     read = ~np.isnan(readings_mm).reshape(-1)
     if read.sum() < LEAST_READINGS:
-        raise ProfileError(f"{read.sum()} readings of the pads are told: at least {LEAST_READINGS} are needed")
+        raise ProfileError(f"{read.sum()} readings of the pads are given: at least {LEAST_READINGS} are needed")
     target, weights = readings_mm.reshape(-1)[read], np.tile(1.0 / READ_MM, readings_mm.size // len(READ_MM))[read]
     places = np.kron(np.eye(len(pieces)), _biases(pieces[0]))[read]
 

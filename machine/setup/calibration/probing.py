@@ -196,7 +196,7 @@ class Measuring:
         off = [float(np.linalg.norm(place - seen)) for place in places]
         if abs(off[0] - off[1]) < TELLING_MM:
             raise PrinterError(
-                f"a small step of {letter} does not tell its sign, the ball has moved by {np.linalg.norm(seen - before):.2f} mm: "
+                f"a small step of {letter} does not show its sign, the ball has moved by {np.linalg.norm(seen - before):.2f} mm: "
                 "does the axis turn, and does the ball stand away from it?"
             )
         self._start = turned[int(off[1] < off[0])]

@@ -179,10 +179,10 @@ def read_sheet(path: Path) -> Sheet:
     factors = tuple(_factor(path, row) for row in rows_of(path, document, "factor"))
     loads: dict[int, tuple[float, ...]] = {}
     for row in rows_of(path, document, "bar"):
-        number, told = _loads(path, shape, row)
+        number, loads_n = _loads(path, shape, row)
         if number in loads:
-            raise ProfileError(f"{path}: bar {number} is told twice: a plate printed again has one more load in its list")
-        loads[number] = told
+            raise ProfileError(f"{path}: bar {number} appears twice: a plate printed again has one more load in its list")
+        loads[number] = loads_n
     if not 1 <= len(factors) <= MOST_FACTORS or len({factor.key for factor in factors}) < len(factors):
         raise ProfileError(f"{path}: {len(factors)} [[factor]] tables: 1 to {MOST_FACTORS} of different keys are expected")
     empty = (float("nan"),)

@@ -34,14 +34,14 @@ class Effect:
     least_ratio: float
 
     @property
-    def told(self) -> bool:
+    def significant(self) -> bool:
         """Whether the effect is significant."""
         return self.by_chance < BY_CHANCE
 
     @property
     def wins(self) -> bool:
         """Whether the other value is significantly better."""
-        return self.told and self.ratio > 1.0
+        return self.significant and self.ratio > 1.0
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def evaluate(sheet: Sheet) -> Outcome:
     plates = sorted({plate for _, plate, _ in rows})
     others = [kind for kind in ("z", "x") if any(KINDS[bar - 1] == kind for bar, _, _ in rows)]
     levels = signs(len(sheet.factors))
-    told = np.array([log(sheet.shape.strength_mpa(load)) for _, _, load in rows])
+    logarithms = np.array([log(sheet.shape.strength_mpa(load)) for _, _, load in rows])
     sought = max(1, len(plates)) + len(others) + len(sheet.factors)
     freedom = len(rows) - sought
     if freedom < LEAST_FREEDOM:
@@ -78,8 +78,8 @@ def evaluate(sheet: Sheet) -> Outcome:
     design = np.array([_row(bar, plate, plates, others, levels) for bar, plate, _ in rows])
     if np.linalg.matrix_rank(design) < sought:
         raise ProfileError("the loads do not tell the settings apart: those of more jointed bars, 1 to 8, are needed")
-    found, *_ = np.linalg.lstsq(design, told, rcond=None)
-    scatter = sqrt(float(np.sum((told - design @ found) ** 2)) / freedom)
+    found, *_ = np.linalg.lstsq(design, logarithms, rcond=None)
+    scatter = sqrt(float(np.sum((logarithms - design @ found) ** 2)) / freedom)
     sigma = scatter * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
     first = len(plates) + len(others)
     effects = tuple(
@@ -188,11 +188,11 @@ def _setting(effect: Effect) -> str:
 
 def _verdict(effect: Effect) -> str:
     change = f"{100 * abs(effect.ratio - 1.0):.0f} % {'stronger' if effect.ratio > 1.0 else 'weaker'}"
-    if effect.told:
+    if effect.significant:
         return f"{change}, {effect.factor.other if effect.wins else effect.factor.own} is taken"
     least = f"{100 * (effect.least_ratio - 1.0):.0f} %"
     chance = f"{100 * (1 - BY_CHANCE):.0f} of 100 times scatter alone stays below {least}"
-    return f"{change} is not told from scatter ({chance}): {effect.factor.own} stays"
+    return f"{change} cannot be distinguished from scatter ({chance}): {effect.factor.own} stays"
 
 
 def _table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

@@ -126,7 +126,7 @@ def _ring(shape: Shape, profile: Profile) -> Ring:
             problem = _problem(shape, ring, whole, halves, machine)
             if problem is None:
                 return ring
-            nearest = max(problem, nearest, key=lambda told: told[0])  # among the last ones, which lean least
+            nearest = max(problem, nearest, key=lambda tried: tried[0])  # among the last ones, which lean least
     raise MoveError(f"no coupon of {shape.name} bars can be printed on {machine.name}: {nearest[1]}")
 
 

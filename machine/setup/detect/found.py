@@ -92,7 +92,7 @@ def axis_readings(
     limits = None
     if low is not None and high is not None and abs(low) < FARTHEST and abs(high) < FARTHEST:
         if not low < high:
-            raise ProfileError(f"{name}: {source} tells limits from {low:g} to {high:g}: the first must be below the second")
+            raise ProfileError(f"{name}: {source} gives limits from {low:g} to {high:g}: the first must be below the second")
         limits = Reading([low, high], source)
     readings = {SPEED: speed, ACCELERATION: acceleration, LIMITS: limits}
     return {key: reading for key, reading in readings.items() if reading is not None}

@@ -58,8 +58,8 @@ def recognise(text: str) -> bool:
 
 def read(config: ConfigText) -> Found:
     """The values in a configuration. Raises ProfileError."""
-    told = config.text.lstrip().startswith("{")
-    sections, version = _told_sections(config) if told else (_sections(config), "")
+    is_answer = config.text.lstrip().startswith("{")
+    sections, version = _answer_sections(config) if is_answer else (_sections(config), "")
     if "printer" not in sections.of:
         raise ProfileError(f"{config.name}: it has no [printer]: is it whole, and are the files it includes beside it?")
     remarks: list[str] = []
@@ -88,7 +88,7 @@ def read(config: ConfigText) -> Found:
     )
 
 
-def _told_sections(config: ConfigText) -> tuple[Sections, str]:
+def _answer_sections(config: ConfigText) -> tuple[Sections, str]:
     """The sections in a query's answer (`config`: texts of the file, `settings`: values in use; titles in lower case), and the
     version."""
     try:
@@ -98,8 +98,8 @@ def _told_sections(config: ConfigText) -> tuple[Sections, str]:
     while isinstance(document, dict) and "configfile" not in document:
         document = next((document[key] for key in ("result", "status") if key in document), None)
     answer = document if isinstance(document, dict) else {}
-    told = answer.get("configfile")
-    own, in_use = (_texts(told.get(key) if isinstance(told, dict) else None) for key in ("config", "settings"))
+    configfile = answer.get("configfile")
+    own, in_use = (_texts(configfile.get(key) if isinstance(configfile, dict) else None) for key in ("config", "settings"))
     written = {title.lower(): title for title in own}
     for title, values in in_use.items():
         whole = written.get(title, title)
@@ -134,8 +134,8 @@ def _linear(sections: Sections, remarks: list[str]) -> dict[str, AxisReadings]:
         remarks.append(f"its kinematics are {named[0]}: how far X, Y and Z reach stands in no axis of them")
     axes: dict[str, AxisReadings] = {}
     for letter in PRINTING:
-        told = ([sections.reading("printer", f"max_{part}{word}") for part in ("", f"{letter.lower()}_")] for word in RATES)
-        speed, acceleration = (min(filter(None, readings), default=None) for readings in told)
+        by_word = ([sections.reading("printer", f"max_{part}{word}") for part in ("", f"{letter.lower()}_")] for word in RATES)
+        speed, acceleration = (min(filter(None, readings), default=None) for readings in by_word)
         title = next((title for title in (f"stepper_{letter.lower()}", f"carriage {letter.lower()}") if title in sections.of), "")
         low, high = (sections.number(title, f"position_{end}") for end in ("min", "max"))
         source, most = f"[{title}] position_min, position_max", high if box else None
@@ -189,9 +189,9 @@ def _turning(sections: Sections, title: str, registration: str) -> AxisReadings:
     """The numbers of a stepper; those of its registration as an axis take precedence."""
     rates: list[Reading | None] = []
     for own in RATES:
-        told = f"LIMIT_{own.upper()}"
-        as_axis = re.search(rf"\b{told}=\s*([0-9]+(?:\.[0-9]+)?)", registration, re.IGNORECASE)
-        reading = Reading(float(as_axis[1]), told) if as_axis else sections.reading(title, own)
+        limit = f"LIMIT_{own.upper()}"
+        as_axis = re.search(rf"\b{limit}=\s*([0-9]+(?:\.[0-9]+)?)", registration, re.IGNORECASE)
+        reading = Reading(float(as_axis[1]), limit) if as_axis else sections.reading(title, own)
         rates.append(reading if reading is not None and reading.value else None)  # without an accel it starts and stops at once
     low, high = (sections.number(title, f"position_{end}") for end in ("min", "max"))
     return axis_readings(f"{sections.name}: [{title}]", rates[0], rates[1], low, high, "position_min, position_max")
@@ -199,8 +199,8 @@ def _turning(sections: Sections, title: str, registration: str) -> AxisReadings:
 
 def _settings(sections: Sections) -> dict[str, Reading]:
     """Settings by key below machine."""
-    told = {key: sections.reading(*place) for key, place in SETTINGS.items()}
-    settings = {key: reading for key, reading in told.items() if reading is not None}
+    readings = {key: sections.reading(*place) for key, place in SETTINGS.items()}
+    settings = {key: reading for key, reading in readings.items() if reading is not None}
     corner = Reading(CORNER_MM_S, "square_corner_velocity, which is 5 where it is not set")
     settings.setdefault("junction_speed_mm_s", corner)
     nozzle, filament = (sections.number("extruder", f"{which}_diameter") for which in ("nozzle", "filament"))

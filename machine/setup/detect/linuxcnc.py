@@ -80,9 +80,9 @@ def _unit(sections: Sections, key: str, units: Mapping[str, float], allowed: str
 def _axis(sections: Sections, letter: str, titles: list[str], unit: float) -> AxisReadings:
     rates: list[Reading | None] = []
     for word in ("VELOCITY", "ACCELERATION"):
-        told = _first(sections, titles, f"MAX_{word}", unit)
+        rate = _first(sections, titles, f"MAX_{word}", unit)
         most = _first(sections, ["TRAJ"], f"MAX_{'ANGULAR' if letter in ABC else 'LINEAR'}_{word}", unit)
-        rates.append(None if told is None else Reading(*min(told, most or told)))
+        rates.append(None if rate is None else Reading(*min(rate, most or rate)))
     low, high = (_first(sections, titles, f"{end}_LIMIT", unit) for end in ("MIN", "MAX"))
     ends = (low[0], high[0]) if low and high else (None, None)
     source = low[1].replace("MIN_LIMIT", "MIN_LIMIT, MAX_LIMIT") if low else ""

@@ -67,7 +67,7 @@ def _words(config: ConfigText) -> dict[str, dict[str, float]]:
     words: dict[str, dict[str, float]] = {}
     for command, rest in REPORT.findall(config.text):
         if command == "G20":
-            raise ProfileError(f"{config.name}: the printer tells inches (G20): send it G21 first, then it tells mm")
+            raise ProfileError(f"{config.name}: the printer reports inches (G20): send it G21 first, then it reports mm")
         letters = {letter: float(number) for letter, number in WORD.findall(rest)}
         if letters.get("T", 0.0) == 0.0 or command not in RATES:
             words[command] = words.get(command, {}) | letters
@@ -110,15 +110,15 @@ def _area(text: str, letters: list[str]) -> dict[str, tuple[float, float, str]]:
 
 def _corner(words: dict[str, dict[str, float]]) -> dict[str, Reading]:
     """Corner speed: the smaller jerk of X and Y, or from the junction deviation at the acceleration of printing moves."""
-    told = words.get("M205", {})
-    jerks = [told[letter] for letter in "XY" if letter in told]
+    report = words.get("M205", {})
+    jerks = [report[letter] for letter in "XY" if letter in report]
     if jerks:
         return {"junction_speed_mm_s": Reading(min(jerks), "M205")}
     printing = words.get("M204", {}).get("P", 0.0)
-    if told.get("J", 0.0) <= 0.0 or printing <= 0.0:
+    if report.get("J", 0.0) <= 0.0 or printing <= 0.0:
         return {}
-    source = f"M205 J{told['J']:g}, at the {printing:g} mm/s2 of M204 P"
-    return {"junction_speed_mm_s": Reading(corner_speed(told["J"], printing), source)}
+    source = f"M205 J{report['J']:g}, at the {printing:g} mm/s2 of M204 P"
+    return {"junction_speed_mm_s": Reading(corner_speed(report["J"], printing), source)}
 
 
 def _identity(text: str) -> tuple[str, str]:

@@ -105,11 +105,11 @@ def _differing(found: Found, machine: Machine) -> int:
     """Number of axis values that differ from a machine's."""
     linear = {"X": machine.x, "Y": machine.y, "Z": machine.z}
     values = [
-        (getattr(linear[letter], LINEAR[key]), told.value) for letter in PRINTING for key, told in found.axes[letter].items()
+        (getattr(linear[letter], LINEAR[key]), read.value) for letter in PRINTING for key, read in found.axes[letter].items()
     ]
     for axis in (machine.tilt, machine.turn):
-        values += [(getattr(axis, ROTARY[key]), told.value) for key, told in found.axes.get(axis.letter, {}).items()]
-    return sum((list(value) if isinstance(value, tuple) else value) != told for value, told in values)
+        values += [(getattr(axis, ROTARY[key]), read.value) for key, read in found.axes.get(axis.letter, {}).items()]
+    return sum((list(value) if isinstance(value, tuple) else value) != read for value, read in values)
 
 
 def _firmware(dialect: str) -> str:
@@ -147,9 +147,8 @@ def _pair(found: Found, named: Machine | None, remarks: list[str]) -> str:
     for why in found.doubtful.values():
         raise ProfileError(f"{why}, so it is not known which two axes tilt and turn the table: {way}")
     if len(found.rotary) < 2:
-        raise ProfileError(
-            f"{found.firmware} tells of {found.rotary or 'no axis'} that turns, the base of two: leave out {option('base')}"
-        )
+        rotary = f"one rotary axis, {found.rotary}" if found.rotary else "no rotary axis"
+        raise ProfileError(f"{found.firmware} reports {rotary}, the base has two: leave out {option('base')}")
     letters = " ".join(found.rotary)
     raise ProfileError(f"{found.firmware} has the rotary axes {letters}, and nothing says which tilts and which turns: {way}")
 
@@ -168,7 +167,7 @@ def _bed(values: Mapping[str, Reading]) -> dict[str, Reading]:
 def _why_fixed(found: Found, base: str) -> str:
     others = " ".join((*found.rotary, *found.doubtful))
     if not others:
-        return f"it tells of no axis that turns: shape is fixed, as in {base}, and all is printed in one part"
+        return f"it reports no rotary axis: shape is fixed, as in {base}, and all is printed in one part"
     return f"shape is fixed, as in {base}, where two axes would tilt and turn the table; of its own it has {others}"
 
 
@@ -199,7 +198,7 @@ def read(config: ConfigText) -> Found:
         f"{word} of {letter}" for letter in PRINTING for word in (SPEED, ACCELERATION) if word not in found.axes.get(letter, {})
     ]
     if lacking:
-        raise ProfileError(f"{config.name}: it is {found.firmware}'s, but tells no {', no '.join(lacking[:2])}: is it whole?")
+        raise ProfileError(f"{config.name}: it is {found.firmware}'s, but reports no {', no '.join(lacking[:2])}: is it whole?")
     axes = {letter: _rounded(readings) for letter, readings in found.axes.items()}
     return replace(found, axes=axes, settings=_rounded(found.settings))
 

@@ -203,7 +203,7 @@ def _read_commands(config: ConfigText) -> Found:
         made = [letter for letter in (*PRINTING, "E", *board.turns) if letter in board.axes or letter in board.turns]
         board.axes = {letter: board.axes.get(letter, {}) for letter in made}
         if silent := [letter for letter in board.turns if SPEED not in board.axes[letter]]:
-            board.remarks.append(f"M584 makes {' and '.join(silent)}, of which no M203 tells the speed")
+            board.remarks.append(f"M584 makes {' and '.join(silent)}, whose speed no M203 gives")
     if name := NAME.search(config.text):
         board.name = name[1]
     if missing:

@@ -61,8 +61,8 @@ def page_words(message: str) -> str:
     >>> from profiles.messages import advice, key_name
     >>> page_words(f"{key_name('process.walls')} is -3: it must be a whole number from 0 to 50")
     'Walls is -3: it must be a whole number from 0 to 50'
-    >>> page_words(f"4 parts would save 21 mm² of scars but take 12 min longer: {advice('parts', 4)}")
-    '4 parts would save 21 mm² of scars but take 12 min longer: take 4 under In how many parts'
+    >>> page_words(f"4 parts would save 21 mm² of blemishes but take 12 min longer: {advice('parts', 4)}")
+    '4 parts would save 21 mm² of blemishes but take 12 min longer: take 4 under In how many parts'
     """
     return rendered(message, _words)
 

@@ -327,7 +327,7 @@ def test_a_model_that_does_better_lying_down_is_laid_down(folder: Path, capsys: 
         assert main(["decompose", "tee.stl", *arguments, *COARSE, "--json", "out.json"]) == 0
         out = json.loads(Path("out.json").read_text())
         turned.append(out["rotate_deg"])
-        told.append("tee.stl: it is laid down on its front (turned 90 about x): in one piece" in capsys.readouterr().err)
+        told.append("tee.stl: it is placed on its front (turned 90 about x): in one piece" in capsys.readouterr().err)
     assert turned == [[0.0, 0.0, 0.0], [90.0, 0.0, 0.0], [90.0, 0.0, 0.0]]
     assert told == [False, True, True]
     assert (out["parts"][0]["direction"], out["residual_area_mm2"]) == ([0.0, 0.0, 1.0], pytest.approx(0.0, abs=1e-6))

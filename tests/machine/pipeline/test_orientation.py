@@ -25,11 +25,11 @@ def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> Non
     oriented = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
     side, upright = best_orientation(tee(), 45.0), facet_orientations(tee(), 45.0)[0]
     assert orientation_in_words(Oriented(side, oriented, 900.0, CUT, upright, True, True), "--as-is keeps it so") == (
-        "it is laid down on its front (turned 90 about x): in one piece with 0 mm² of scars in 30m, as it stands in 3 parts with"
-        " 78 mm² of scars in 1h 0m; --as-is keeps it so",
+        "it is placed on its front (turned 90 about x): in one piece with 0 mm² of blemishes in 30m, as it stands in 3 parts with"
+        " 78 mm² of blemishes in 1h 0m; --as-is keeps it so",
     )
     assert orientation_in_words(Oriented(side, oriented, 900.0, None, upright, True, True), "--as-is keeps it so") == (
-        "it is laid down on its front (turned 90 about x): in one piece with 0 mm² of scars in 30m, as it stands 300 mm² hang"
+        "it is placed on its front (turned 90 about x): in one piece with 0 mm² of blemishes in 30m, as it stands 300 mm² hang"
         " over; --as-is keeps it so",
     )
     assert orientation_in_words(Oriented(None, oriented, 900.0, WHOLE, upright, True, True), "--as-is keeps it so") == ()

@@ -17,7 +17,7 @@ PLANE = Plane(np.array([0.0, 0.0, 1.0]), 5.0)
 
 
 def front(*costs_and_times: tuple[float, float | None]) -> list[FrontRow]:
-    """Rows of one part, two parts and so on, with these mm² of scars and seconds."""
+    """Rows of one part, two parts and so on, with these mm² of blemishes and seconds."""
     rows = enumerate(costs_and_times)
     return [FrontRow((PLANE,) * count, cost_mm2, 0.0, cost_mm2, time_s=time_s) for count, (cost_mm2, time_s) in rows]
 
@@ -52,7 +52,7 @@ def test_where_only_time_counts_the_fastest_row_that_saves_scars_is_taken(values
     assert (rows[choose(rows, Weights(1e9)).place].time_s or 0.0) - fastest_s <= 1e-3
 
 
-# Three pieces with 100 mm² of time each; every cut saves 200 mm² of scars more than the next.
+# Three pieces with 100 mm² of time each; every cut saves 200 mm² of blemishes more than the next.
 THREE = front((1000.0, 200.0), (600.0, 200.0), (400.0, 200.0))
 
 
@@ -67,11 +67,11 @@ def test_the_reason_names_the_demand_that_more_parts_do_not_meet() -> None:
 
 def test_what_more_cuts_would_save_is_told_with_what_it_takes() -> None:
     choice = choose(THREE, Weights(0.5), least_saving=0.4)
-    assert choice.note == (f"3 parts would save 600 mm² of scars with 2 more cuts: {advice('parts', 3)}",)
+    assert choice.note == (f"3 parts would save 600 mm² of blemishes with 2 more cuts: {advice('parts', 3)}",)
     rows = front((1000.0, 900.0), (500.0, 800.0))
     rows = [replace(row, filament_mm=filament_mm) for row, filament_mm in zip(rows, (10_000.0, 12_000.0), strict=True)]
     choice = choose(rows, Weights(0.5), least_saving=0.6)
-    assert choice.note == (f"2 parts would save 500 mm² of scars but take 2.0 m more filament: {advice('parts', 2)}",)
+    assert choice.note == (f"2 parts would save 500 mm² of blemishes but take 2.0 m more filament: {advice('parts', 2)}",)
 
 
 def test_a_row_that_costs_more_than_one_with_fewer_parts_is_not_taken_however_fast() -> None:
@@ -87,7 +87,7 @@ def test_a_row_that_cannot_be_printed_is_not_taken_while_another_one_can() -> No
 def test_what_is_given_up_for_time_is_told_with_figures() -> None:
     choice = choose(BUNNY, Weights(1.0))
     assert choice.reason == "the least cost with its time"
-    assert choice.note == (f"4 parts would save 501 mm² of scars but take 24 min longer: {advice('parts', 4)}",)
+    assert choice.note == (f"4 parts would save 501 mm² of blemishes but take 24 min longer: {advice('parts', 4)}",)
     assert choose(BUNNY, Weights(0.0)).note == ()
 
 

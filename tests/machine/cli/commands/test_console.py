@@ -144,7 +144,7 @@ def test_a_port_where_no_printer_is_gets_the_sentence_of_print(
     hear_out(monkeypatch, ports)
     with on_terminal(lambda data, baud: data) as path:
         assert piped("G28\n", path) == 1
-    assert f"what answers at {path} is no printer: it sends back what it is told" in capsys.readouterr().err
+    assert f"what answers at {path} is no printer: it sends back what it receives" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("options", "words"), [

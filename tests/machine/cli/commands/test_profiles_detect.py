@@ -103,7 +103,7 @@ def test_a_machine_that_turns_nothing_has_the_shape_fixed(tmp_path: Path, capsys
     machine = detected(tmp_path / "my.toml", file)
     assert (machine.shape, machine.dialect, machine.tool_mm) == ("fixed", "klipper", (2.75, 75.0, 0.0))
     assert machine.table.size_mm == (285.5, 150.0)
-    assert "it tells of no axis that turns: shape is fixed" in capsys.readouterr().out
+    assert "it reports no rotary axis: shape is fixed" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -196,7 +196,7 @@ def test_what_is_no_printer_is_one_sentence(
     monkeypatch.setattr(settings_queries, "ask_at_any_rate", partial(ask_at_any_rate, timeout_s=0.3))
     out = tmp_path / "my.toml"
     with on_terminal(lambda data, baud: data) as echo:
-        assert "sends back what it is told" in refusal(capsys, out, "--port", echo)
+        assert "sends back what it receives" in refusal(capsys, out, "--port", echo)
     assert "/dev/nowhere" in refusal(capsys, out, "--port", "/dev/nowhere")
 
 
@@ -227,7 +227,7 @@ def test_numbers_that_no_machine_has_are_one_sentence(tmp_path: Path, capsys: py
     file.write_text(LOG.replace("X250.00", "X99999.00"))
     assert "m503.log: its values are not those of a machine: " in refusal(capsys, tmp_path / "my.toml", file)
     file.write_text(LOG.replace("Max:  X110.00", "Max:  X-111.00"))
-    assert "axis X: M211 tells limits from -110 to -111" in refusal(capsys, tmp_path / "my.toml", file)
+    assert "axis X: M211 gives limits from -110 to -111" in refusal(capsys, tmp_path / "my.toml", file)
 
 
 def test_a_profile_that_is_there_is_not_written_over(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

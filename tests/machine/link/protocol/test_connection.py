@@ -202,7 +202,7 @@ def test_a_printer_that_answers_only_lines_without_numbers_is_told_from_one_that
     table = converse(Counting(0, b"", takes_numbers=False))
     assert str(table.connection.fault) == (
         "the printer answers M115, but neither M110 nor any line with a number and a checksum: this program sends no other "
-        "lines, for a damaged one could not be told"
+        "lines, for a damaged one could not be detected"
     )
 
 

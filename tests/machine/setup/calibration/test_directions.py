@@ -44,13 +44,13 @@ def test_touches_two_hundredths_off_predict_the_reach_to_a_twentieth() -> None:
 def test_touches_at_one_turn_do_not_tell_the_directions() -> None:
     random = np.random.default_rng(1)
     touches = touches_at(machine_of("generic_ac"), (0.0, 10.0, 20.0, 30.0, 40.0), 1, MARK, 0.0, random)
-    with pytest.raises(ProfileError, match="the touches do not tell"):
+    with pytest.raises(ProfileError, match="the touches do not determine"):
         calibrate(machine_of("generic_ac"), touches, MARK[2], directions=True)
 
 
 def test_three_touches_are_too_few_for_directions() -> None:
     touches = touches_at(machine_of("generic_ac"), (0.0, 30.0, -30.0), 1, MARK, 0.0, np.random.default_rng(1))
-    with pytest.raises(ProfileError, match="3 touches tell 9 numbers, 11 are sought"):
+    with pytest.raises(ProfileError, match="3 touches determine 9 numbers, 11 are sought"):
         calibrate(machine_of("generic_ac"), touches, MARK[2], directions=True)
 
 

@@ -78,10 +78,10 @@ def test_a_misread_touch_is_named() -> None:
 @pytest.mark.parametrize(
     ("rows", "sentence"),
     [
-        (slice(0, 2), "2 touches tell 6 numbers, 8 are sought"),
+        (slice(0, 2), "2 touches determine 6 numbers, 8 are sought"),
         (slice(0, 4), "all touches are at tilt 0: the tilt axis is found from two tilts or more"),
-        (slice(0, 12, 4), "the touches do not tell"),
-        (slice(0, 12, 2), "the touches do not tell the sign of C"),
+        (slice(0, 12, 4), "the touches do not determine"),
+        (slice(0, 12, 2), "the touches do not determine the sign of C"),
     ],
 )
 def test_too_few_touches_are_refused(rows: slice, sentence: str) -> None:

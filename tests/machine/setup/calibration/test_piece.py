@@ -84,5 +84,5 @@ def test_a_misread_pad_is_named() -> None:
 def test_three_readings_are_too_few() -> None:
     readings = np.full((1, 4, 3), np.nan)
     readings[0, 0] = 0.0
-    with pytest.raises(ProfileError, match="3 readings of the pads are told: at least 4 are needed"):
+    with pytest.raises(ProfileError, match="3 readings of the pads are given: at least 4 are needed"):
         correct(GENERIC, [standing(GENERIC)], readings)

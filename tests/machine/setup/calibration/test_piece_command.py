@@ -84,7 +84,7 @@ def test_readings_are_text_and_back() -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("0,0,1.2", "tells of 1 pads: 4 are expected"),
+        ("0,0,1.2", "has 1 pads: 4 are expected"),
         ("0,x,1.2 0,0 0,0 0,0", "pad 1: '0,x,1.2' cannot be read"),
         ("0,0,1.2 0,0 0,0,12 0,0", "pad 3: height 12 cannot be: 0 to 4 is allowed"),
         ("0,0,1.2 0,-99 0,0 0,0", "pad 2: up -99 cannot be: -30 to 30 is allowed"),

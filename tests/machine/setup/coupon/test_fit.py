@@ -43,14 +43,14 @@ def test_the_scatter_and_the_strength_of_the_best_joint_are_found() -> None:
 
 def test_what_scatter_hides_keeps_the_default_and_says_how_large_an_effect_would_show() -> None:
     (effect,) = evaluate(broken((1.05,), 1, 0.1, 3)).effects
-    assert not effect.told
+    assert not effect.significant
     assert not effect.wins
     assert effect.least_ratio > 1.1
 
 
 def test_a_setting_that_harms_is_told_and_does_not_win() -> None:
     effect = evaluate(broken(TRUTH, 3, 0.05, 1)).effects[1]
-    assert effect.told
+    assert effect.significant
     assert not effect.wins
 
 

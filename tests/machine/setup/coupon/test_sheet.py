@@ -38,7 +38,7 @@ def test_it_says_of_each_bar_what_it_is() -> None:
         ("number = 3", "number = 13", "there is no bar 13: the bars are 1 to 12"),
         ("number = 3", "number = 0", "there is no bar 0: the bars are 1 to 12"),
         ("number = 3", 'number = "3"', "there is no bar '3'"),
-        ("number = 3", "number = 2", "bar 2 is told twice"),
+        ("number = 3", "number = 2", "bar 2 appears twice"),
         ("number = 3", "number = 3\nmass = 2", "bar 3: mass is not known: allowed are number and loads_n"),
         ("[nan]", "[0.0]", "bar 1: a load of 0 N cannot be: above 0 and up to 2133 N (300 MPa) is allowed"),
         ("[nan]", "[-5]", "bar 1: a load of -5 N cannot be"),

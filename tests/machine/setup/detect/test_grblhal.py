@@ -94,5 +94,5 @@ def test_an_axis_that_376_calls_linear_does_not_turn() -> None:
 def test_half_a_dump_is_refused() -> None:
     with pytest.raises(ProfileError, match="no acceleration of Y, no acceleration of Z: is it whole"):
         found(DUMP.replace("$121=500.000\n$122=60.000\n", ""))
-    with pytest.raises(ProfileError, match=r"axis X: \$130 tells limits from 50 to 0"):
+    with pytest.raises(ProfileError, match=r"axis X: \$130 gives limits from 50 to 0"):
         found(DUMP.replace("$130=200", "$130=-50"))

@@ -209,7 +209,7 @@ def test_a_delta_tells_no_reach() -> None:
         (
             GIMBAL,
             STEPPERS.replace("145.5", "-145"),
-            "axis X: .stepper_x. position_min, position_max tells limits from -140 to -145",
+            "axis X: .stepper_x. position_min, position_max gives limits from -140 to -145",
         ),
         (GIMBAL.replace("280 ", "fast "), STEPPERS, "max_velocity is 'fast', which is no number"),
         ("[include a.cfg]", "[include a.cfg]", "more than 100 files"),

@@ -116,7 +116,7 @@ def test_a_file_of_before_2_8_numbers_its_axes() -> None:
     ("text", "axes", "sentence"),
     [
         (INI, AXES[:110], "no acceleration of Y, no speed of Z: is it whole"),
-        (INI, AXES.replace("152.5", "-152.5"), "axis X: .JOINT_0. MIN_LIMIT, MAX_LIMIT tells limits from -150 to -152.5"),
+        (INI, AXES.replace("152.5", "-152.5"), "axis X: .JOINT_0. MIN_LIMIT, MAX_LIMIT gives limits from -150 to -152.5"),
         (INI.replace("= mm", "= furlong"), AXES, "LINEAR_UNITS is 'furlong': mm or inch is expected"),
         (INI, AXES + "MAX_VEL", "neither a section nor a setting"),
     ],

@@ -127,7 +127,7 @@ def test_how_far_cables_let_the_table_wind_is_measured() -> None:
 
 
 def test_a_base_with_two_rotary_axes_is_not_put_over_a_machine_without() -> None:
-    with pytest.raises(ProfileError, match="tells of no axis that turns, the base of two: leave out --base"):
+    with pytest.raises(ProfileError, match="reports no rotary axis, the base has two: leave out --base"):
         propose(found(re.sub(r" [AC]-?\d\S*", "", LOG)), "generic_ac")
 
 
@@ -140,9 +140,9 @@ def test_filament_in_mm3_is_left_and_said() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "sentence"),
     [
-        ("echo:  M201", "echo:  M2", "tells no acceleration of X, no acceleration of Y: is it whole"),
-        ("G21", "G20", "tells inches"),
-        ("Max:  X110.00", "Max:  X-120.00", "axis X: M211 tells limits from -110 to -120"),
+        ("echo:  M201", "echo:  M2", "reports no acceleration of X, no acceleration of Y: is it whole"),
+        ("G21", "G20", "reports inches"),
+        ("Max:  X110.00", "Max:  X-120.00", "axis X: M211 gives limits from -110 to -120"),
     ],
 )
 def test_half_a_log_inches_and_reversed_limits_are_refused(old: str, new: str, sentence: str) -> None:

@@ -113,7 +113,7 @@ def test_a_macro_that_is_not_beside_the_file_is_named() -> None:
 def test_an_axis_of_which_no_speed_is_told_is_kept_and_said() -> None:
     told = found(CRADLE, SPEEDS.replace(" B1800", ""))
     assert (told.rotary, "speed" in told.axes["B"]) == ("BC", False)
-    assert told.remarks == ["M584 makes B, of which no M203 tells the speed"]
+    assert told.remarks == ["M584 makes B, whose speed no M203 gives"]
 
 
 def test_letters_that_m584_does_not_make_are_passed_over() -> None:
@@ -175,8 +175,8 @@ def test_a_config_g_is_not_taken_for_a_log_of_marlin() -> None:
     ("text", "speeds", "sentence"),
     [
         (CRADLE, SPEEDS.replace("M201 X3000 Y2900 Z100", "M201"), "no acceleration of X"),
-        (CRADLE.replace("B-100:100", "B100:-100"), SPEEDS, "axis B: M208 tells limits from 100 to -100"),
-        (CRADLE.replace("B0.3 C0.4 ", ""), 'M98 P"speeds.g"', "config.g: it is RepRapFirmware's, but tells no speed of X"),
+        (CRADLE.replace("B-100:100", "B100:-100"), SPEEDS, "axis B: M208 gives limits from 100 to -100"),
+        (CRADLE.replace("B0.3 C0.4 ", ""), 'M98 P"speeds.g"', "config.g: it is RepRapFirmware's, but reports no speed of X"),
         (model()[:-30], "", "cut off or damaged"),
         (model(min=95.0), "", "limits from 95 to 90"),
     ],
