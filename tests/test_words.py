@@ -18,6 +18,16 @@ WORDS = {
     r"\blook(s|ed) at\b": "examined, considered",
     r"\bso many\b": "a number, a count",
     r"(?-i:^(Of|What|Whose)\b)": "a noun phrase: the part of, the faces above",
+    r"\bgo(es)? on\b|\bwent on\b": "continue, proceed",
+    r"\bwork(s|ed)? out\b": "compute, derive",
+    r"\bany more\b": "no longer",
+    r"\bin the place of\b": "in place of",
+    r"\b(take|takes|taken|took) (it |them )?away\b": "remove",
+    r"\bthe \w+ before(?=[.,;:)]|$)": "the previous",
+    r", for (it|they|there|nothing|no|such)\b": "because",
+    r"\bhears? of\b|\bheard of\b|\bheeds?\b": "receive, notice, handle",
+    r"\b(lies?|stands?|turned|laid|cut) otherwise\b": "differently",
+    r"\bfor want of\b": "without, for lack of",
     r"^The same\b": "the subject itself: a docstring is read alone",
     r"\bfrom (here|there|now|then|that|this|it|where it \w+) on\b": "from here, after that, at or above",
     r"\bthat \w+ \w+ leaves to\b": "the rest, the remainder",
@@ -40,29 +50,19 @@ WORDS = {
     r"\bmends?\b": "repair, fix, replace",
     r"(?<!there )\b(is|are) no (?!\w+er\b|more\b|less\b|such\b|room\b)": "is not a, are not",
     r"\bby way of\b": "through, via",
-    r"\bgo(es)? on\b|\bwent on\b": "continue, proceed",
-    r"\bwork(s|ed)? out\b": "compute, derive",
-    r"\bany more\b": "no longer",
-    r"\bin the place of\b": "in place of",
-    r"\b(take|takes|taken|took) (it |them )?away\b": "remove",
-    r"\bthe \w+ before(?=[.,;:)]|$)": "the previous",
-    r", for (it|they|there|nothing|no|such)\b": "because",
-    r"\bhears? of\b|\bheard of\b|\bheeds?\b": "receive, notice, handle",
-    r"\b(lies?|stands?|turned|laid|cut) otherwise\b": "differently",
-    r"\bfor want of\b": "without, for lack of",
 }
 
 CODE = re.compile(r"`[^`]*`|\w+(?:/\w+)*\.cpp")  # names are checked where they are defined
 
 
 def words_of(source: str) -> Iterator[tuple[int, str]]:
-    """The paragraphs of a file's docstrings and comments, each as one line without code, with the number of its first line."""
+    """The paragraphs of a file's docstrings and comments, each as one line, with the number of its first line."""
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef) and (
             text := ast.get_docstring(node)
         ):
             for paragraph in re.sub(r"^>>> .*?(\n\n|\Z)", "", text, flags=re.DOTALL | re.MULTILINE).split("\n\n"):
-                yield node.body[0].lineno, CODE.sub("", " ".join(paragraph.split()))
+                yield node.body[0].lineno, " ".join(paragraph.split())
     for token in tokenize.generate_tokens(io.StringIO(source).readline):
         if token.type == tokenize.COMMENT:
             yield token.start[0], token.string.lstrip("# ")
