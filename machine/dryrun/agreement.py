@@ -23,7 +23,7 @@ from mdp.cut import mesh_of, solid_of
 from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices, Mesh
-from mdp.sweep.rays import nearest_faces, windings
+from mdp.sweep.rays import TriangleTree, nearest_faces, triangle_tree, windings
 from mdp.topology.cross_section import cross_sections, loop_edges
 from mdp.zone import Modifier
 from profiles.part_settings import process_of_part
@@ -74,11 +74,12 @@ def agreement(run: DryRun, mesh: Mesh, profile: Profile, modifiers: Sequence[Mod
     """
     tolerance_mm = 0.5 * profile.process.line_width_mm + reach_mm(profile.process)
     mesh = mesh_of(solid_of(mesh))  # in spatial order, for a fast search of nearest faces
-    beyond_mm, length_mm, rows = pieces_outside(run, mesh, tolerance_mm)
+    surface = triangle_tree(mesh)
+    beyond_mm, length_mm, rows = pieces_outside(run, surface, tolerance_mm)
     outside = beyond_mm > tolerance_mm
     assert run.contacts is not None
     length, loose, reported = unsupported_mm(run.program, run.deposited, run.contacts)
-    whole, shifted = max(length, 1e-9), shifts(run, mesh)
+    whole, shifted = max(length, 1e-9), shifts(run, surface)
     result = Agreement(
         filled=filled_share(run, mesh),
         outside=float(length_mm[outside].sum() / max(length_mm.sum(), 1e-9)),
@@ -119,37 +120,35 @@ def _shift_findings(run: DryRun, shifted: Mapping[int, tuple[int, Floats]]) -> I
             yield at_row(run.program, row, "error", "shift", message)
 
 
-def pieces_outside(run: DryRun, mesh: Mesh, tolerance_mm: float) -> tuple[Floats, Floats, Indices]:
-    """The strokes, without skirt and support, in k pieces of at most 1 mm: (k,) distances of their midpoints from the solid,
-    lengths and rows.
-
-    The distances are 0 inside and limited to four tolerances, at least 1 mm. mesh: the closed model in the workpiece frame.
-    """
+def pieces_outside(run: DryRun, surface: TriangleTree, tolerance_mm: float) -> tuple[Floats, Floats, Indices]:
+    """The strokes, skirt and support aside, in k pieces of at most 1 mm: (k,) distances of their midpoints from the solid, 0
+    inside it, up to four tolerances and at least 1 mm; (k,) lengths and rows. surface: that of the closed model in the workpiece
+    frame."""
     which = of_model(run)
     segments, length_mm = run.deposited.segments(which), run.deposited.length_mm[which]
     counts = np.maximum(np.ceil(length_mm / PIECE_MM), 1).astype(np.int64)
     piece = np.repeat(np.arange(len(which)), counts)
     share = (np.arange(len(piece)) - np.repeat(np.cumsum(counts) - counts, counts) + 0.5) / counts[piece]
     middles = segments[piece, 0] + share[:, None] * (segments[:, 1] - segments[:, 0])[piece]
-    return outside_mm(middles, mesh, max(4.0 * tolerance_mm, 1.0)), (length_mm / counts)[piece], run.segment_row[which][piece]
+    return outside_mm(middles, surface, max(4.0 * tolerance_mm, 1.0)), (length_mm / counts)[piece], run.segment_row[which][piece]
 
 
-def outside_mm(points: Floats, mesh: Mesh, most_mm: float) -> Floats:
-    """(n,) distances of (n, 3) points from a closed mesh's solid: 0 inside, at most most_mm."""
-    distances, out = np.zeros(len(points)), np.flatnonzero(~inside(points, mesh))
-    distances[out] = nearest_faces(mesh, points[out], most_mm)[0]
+def outside_mm(points: Floats, surface: TriangleTree, most_mm: float) -> Floats:
+    """(n,) distances of (n, 3) points from a closed surface's solid: 0 inside, at most most_mm (farther is not looked for)."""
+    distances, out = np.zeros(len(points)), np.flatnonzero(~inside(points, surface))
+    distances[out] = nearest_faces(surface, points[out], most_mm)[0]
     return distances
 
 
-def inside(points: Floats, mesh: Mesh) -> NDArray[np.bool_]:
-    """(n,) whether (n, 3) points are inside a closed mesh's solid, which may intersect itself."""
-    within: NDArray[np.bool_] = windings(mesh, points + ASIDE_MM) > 0
+def inside(points: Floats, surface: TriangleTree) -> NDArray[np.bool_]:
+    """(n,) whether (n, 3) points lie in a closed surface's solid, also where it intersects itself."""
+    within: NDArray[np.bool_] = windings(surface, points + ASIDE_MM) > 0
     return within
 
 
-def shifts(run: DryRun, mesh: Mesh) -> dict[int, tuple[int, Floats]]:
-    """For every part with enough outer walls the row of its first one, and its shift (3,) from the closed model, mm, workpiece
-    frame."""
+def shifts(run: DryRun, surface: TriangleTree) -> dict[int, tuple[int, Floats]]:
+    """For every part with enough outer walls the row of its first one, and (3,) mm, workpiece frame, by which it lies beside the
+    closed model, given by its surface."""
     walls = np.flatnonzero(run.program.rows_of_types(*WALLS)[run.segment_row])
     walls = walls[run.deposited.length_mm[walls] > LEAST_MM]
     part, shifted = run.program.part[run.segment_row[walls]], dict[int, tuple[int, Floats]]()
@@ -158,10 +157,10 @@ def shifts(run: DryRun, mesh: Mesh) -> dict[int, tuple[int, Floats]]:
         ups = run.deposited.directions(pieces)
         width, height = run.deposited.sizes[run.deposited.size[pieces]].T
         points = run.deposited.segments(pieces).mean(axis=1) - 0.5 * height[:, None] * ups
-        distance, face = nearest_faces(mesh, points, NEAR_MM)
-        normals = mesh.normals[face]
+        distance, face = nearest_faces(surface, points, NEAR_MM)
+        normals = surface.normals[face]
         lateral = np.sqrt(np.maximum(0.0, 1.0 - (normals * ups).sum(axis=1) ** 2))
-        beside = np.where(inside(points, mesh), -distance, distance) + 0.5 * width * lateral
+        beside = np.where(inside(points, surface), -distance, distance) + 0.5 * width * lateral
         use = (distance < NEAR_MM) & (np.abs(beside) < NEAR_MM) & (lateral > 0.5)
         by_mm = fit_shift(normals[use], beside[use])
         if by_mm is not None:

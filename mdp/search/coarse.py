@@ -18,7 +18,7 @@ from mdp.search.front import Pricing, front_row, with_price
 from mdp.search.parts import decomposition_of, make_parts, notes_of_search
 from mdp.search.polish import refine_planes
 from mdp.search.problem import Problem
-from mdp.sweep.rays import nearest_faces
+from mdp.sweep.rays import nearest_faces, triangle_tree
 from mdp.zone import Volume, Zones
 from profiles.profile import Profile
 
@@ -43,7 +43,7 @@ def coarse_copy(mesh: Mesh, profile: Profile, zones: Zones, on_phase: Callable[[
         if len(copy.faces) >= WORTH * len(mesh.faces):
             break
         few = tolerance == COARSEST[0] and len(copy.faces) < search.simplify_faces / 2
-        if not few and nearest_faces(copy, mesh.vertices, off * layer_mm)[0].max() < off * layer_mm:
+        if not few and nearest_faces(triangle_tree(copy), mesh.vertices, off * layer_mm)[0].max() < off * layer_mm:
             return copy
     return None
 

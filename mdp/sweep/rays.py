@@ -190,12 +190,12 @@ def _find_blocked(begin: int, end: int, tree: TriangleTree, bundles: tuple[Float
         out[f] = blocked / len(rays)
 
 
-def windings(surface: Mesh, places: Floats) -> Ints:
-    """(n,) winding number of a closed mesh, whose faces are in spatial order, about each point (n, 3): how many solids of it the
+def windings(surface: TriangleTree, places: Floats) -> Ints:
+    """(n,) winding number of a closed surface about each point (n, 3): how many solids of it the
     point lies in. Counted along upright rays, which must not meet an edge.
     """
     counts = np.zeros(len(places), np.int32)
-    in_threads(_find_windings, len(places), triangle_tree(surface), places, counts)
+    in_threads(_find_windings, len(places), surface, places, counts)
     return counts
 
 
@@ -223,11 +223,11 @@ def _find_windings(begin: int, end: int, tree: TriangleTree, places: Floats, cou
                     counts[k] += 1 if tree.normals[f, 2] > 0.0 else -1
 
 
-def nearest_faces(surface: Mesh, places: Floats, reach_mm: float) -> tuple[Floats, Ints]:
-    """(n,) distances of points (n, 3) from a mesh whose faces are in spatial order, mm, and (n,) the nearest faces; reach_mm and
-    face 0 for points farther away."""
+def nearest_faces(surface: TriangleTree, places: Floats, reach_mm: float) -> tuple[Floats, Ints]:
+    """(n,) distances of points (n, 3) from a surface, mm, and (n,) the nearest faces; reach_mm and face 0 for points farther
+    away."""
     squares, nearest = np.full(len(places), reach_mm * reach_mm), np.zeros(len(places), np.int32)
-    in_threads(_find_nearest, len(places), triangle_tree(surface), places, squares, nearest)
+    in_threads(_find_nearest, len(places), surface, places, squares, nearest)
     return np.sqrt(squares), nearest
 
 

@@ -1,8 +1,13 @@
+import manifold3d as m3
 import numpy as np
 import pytest
 
 from machine.dryrun import dry_run
 from machine.dryrun.agreement import agreement, shifts
+from mdp.cut import mesh_of
+from mdp.mesh import Mesh
+from mdp.sweep.rays import triangle_tree
+from mdp.zone import Modifier, Zone
 from profiles.profile import Profile, load
 from tests import shapes
 from tests.machine.dryrun.bent import bent
@@ -38,6 +43,13 @@ def test_a_box_without_its_upper_half_is_unfilled_unless_the_infill_is_sparse() 
     assert codes(filled_box(25), load(settings=["process.infill_density=0.2"])) == set()
 
 
+def test_a_box_with_a_region_of_sparse_infill_may_stay_unfilled() -> None:
+    profile, lines = load(settings=FULL), filled_box(25)
+    sparse, thick = (Modifier(Zone((-9.0, -9.0, 0.0), (9.0, 9.0, 9.0)), own) for own in ({"infill_density": 0.2}, {"walls": 4}))
+    found = [agreement(dry_run(lines, profile), BOX, profile, [modifier])[1].findings for modifier in (sparse, thick)]
+    assert ["unfilled" in {finding.code for finding in findings} for findings in found] == [False, True]
+
+
 def test_a_box_printed_two_tenths_aside_is_within_half_a_line_and_one_farther_aside_is_not() -> None:
     assert codes(filled_box(50, 0.2), load(settings=FULL)) == set()
     assert codes(filled_box(50, 1.0), load(settings=FULL)) == {"outside", "unfilled"}
@@ -63,7 +75,7 @@ def untold(lines: Lines) -> Lines:
 def test_a_shifted_part_is_told_and_the_others_lie_where_they_should(index: int, letter: str, by_mm: float) -> None:
     profile, model, lines = bent("generic_ac")
     moved = on(part(index), word(letter, lambda x: x + by_mm))(untold(list(lines)))
-    sizes = {part: np.linalg.norm(by) for part, (_, by) in shifts(dry_run(moved, profile), model).items()}
+    sizes = {part: np.linalg.norm(by) for part, (_, by) in shifts(dry_run(moved, profile), triangle_tree(model)).items()}
     assert sizes == pytest.approx({k: abs(by_mm) if k == index else 0.0 for k in (1, 2, 3)}, abs=0.01)
 
 
@@ -77,8 +89,24 @@ def test_the_finding_names_the_part_and_the_direction_on_the_table() -> None:
     assert agreed.shift_mm == pytest.approx(0.2, abs=0.005)
 
 
+def wedge() -> Mesh:
+    """A block of 20 by 20 by 10 mm, whose left side leans inward by 45 degrees."""
+    corners = [(x + max(z * (x < 0), 0.0), y, z) for x in (-10.0, 10.0) for y in (-10.0, 10.0) for z in (0.0, 10.0)]
+    return mesh_of(m3.Manifold.hull_points(np.array(corners)))
+
+
+def test_walls_of_another_slope_on_each_side_lie_half_their_width_inside_the_model() -> None:
+    lines = ["G28", "M83", "M104 S200", "M109 S200", ";TYPE:Outer wall", ";WIDTH:0.4", ";HEIGHT:0.2"]
+    for layer in range(50):
+        left = 0.2 * (layer + 0.5) - 9.8  # at the middle of the layer
+        lines += [f"G0 Z{0.2 * (layer + 1):.1f} F600", f"G0 X{left:.3f} Y-9.8 F6000"]
+        lines += [f"G1 X{x:.3f} Y{y} E0.5 F600" for x, y in ((9.8, -9.8), (9.8, 9.8), (left, 9.8), (left, -9.8))]
+    ((_, by_mm),) = shifts(dry_run(lines, load()), triangle_tree(wedge())).values()
+    assert by_mm == pytest.approx([0.0, 0.0, 0.0], abs=0.01)
+
+
 @pytest.mark.parametrize("machine", ["generic_ac", "gen5x", "linuxcnc_xyzac"])
 def test_an_untouched_part_lies_where_its_model_does(machine: str) -> None:
     profile, model, lines = bent(machine)
-    found = shifts(dry_run(lines, profile), model)
+    found = shifts(dry_run(lines, profile), triangle_tree(model))
     assert np.array([shift_mm for _, shift_mm in found.values()]) == pytest.approx(np.zeros((3, 3)), abs=0.01)

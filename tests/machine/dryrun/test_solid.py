@@ -8,7 +8,7 @@ from trimesh.triangles import closest_point
 
 from machine.dryrun.agreement import ROUND_MM, fill, fit_shift, inside, outside_mm
 from mdp.mesh import Floats, Mesh
-from mdp.sweep.rays import nearest_faces
+from mdp.sweep.rays import nearest_faces, triangle_tree
 from tests.mdp.solids import random_solid
 from tests.shapes import ball, box, hollow
 
@@ -46,18 +46,18 @@ def distances_mm(points: Floats, mesh: Mesh) -> Floats:
 def test_a_point_lies_inside_where_the_surface_winds_about_it(seed: int) -> None:
     mesh = random_solid(seed)
     points = points_about(mesh, seed)
-    assert np.array_equal(inside(points, mesh), windings(points, mesh) > 0.5)
+    assert np.array_equal(inside(points, triangle_tree(mesh)), windings(points, mesh) > 0.5)
 
 
 @pytest.mark.parametrize(("mesh", "z_mm", "within"), [(box(), 10.0, True), (hollow(), 10.0, False), (hollow(), 2.0, True)])
 def test_a_point_right_above_the_edges_of_faces_lies_inside_all_the_same(mesh: Mesh, z_mm: float, within: bool) -> None:
-    assert inside(np.array([(0.0, 0.0, z_mm), (1.0, 1.0, z_mm), (-2.0, 2.0, z_mm)]), mesh).tolist() == [within] * 3
+    assert inside(np.array([(0.0, 0.0, z_mm), (1.0, 1.0, z_mm), (-2.0, 2.0, z_mm)]), triangle_tree(mesh)).tolist() == [within] * 3
 
 
 def test_a_point_right_below_a_corner_of_faces_lies_inside_all_the_same() -> None:
     sphere = ball(10.0, 24)
     top = sphere.vertices[sphere.vertices[:, 2].argmax()]
-    assert inside(top + np.array([(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]), sphere).tolist() == [True, False]
+    assert inside(top + np.array([(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]), triangle_tree(sphere)).tolist() == [True, False]
 
 
 def test_a_point_in_two_bodies_that_overlap_lies_inside_below_the_face_of_either() -> None:
@@ -67,7 +67,16 @@ def test_a_point_in_two_bodies_that_overlap_lies_inside_below_the_face_of_either
         np.vstack([low.faces, high.faces + len(low.vertices)]),
     )
     points = np.array([(2.0, 1.0, 2.0), (2.0, 1.0, 7.0), (2.0, 1.0, 22.0), (-9.0, 1.0, 22.0), (14.0, 1.0, 2.0)])
-    assert inside(points, both).tolist() == [True, True, True, False, False]
+    assert inside(points, triangle_tree(both)).tolist() == [True, True, True, False, False]
+
+
+def test_a_point_in_a_body_that_is_inside_out_lies_outside() -> None:
+    right = box(20.0, 20.0, 20.0)
+    inside_out = Mesh(right.vertices, right.faces[:, ::-1])
+    assert [inside(np.array([(2.0, 1.0, 9.0)]), triangle_tree(mesh)).tolist() for mesh in (right, inside_out)] == [
+        [True],
+        [False],
+    ]
 
 
 @settings(max_examples=12)
@@ -77,16 +86,18 @@ def test_points_are_as_far_from_a_solid_as_from_its_nearest_face(seed: int) -> N
     points = points_about(mesh, seed, 40)
     away = distances_mm(points, mesh)
     nearest = away.min(axis=1)
-    distances, faces = nearest_faces(mesh, points, MOST_MM)
+    distances, faces = nearest_faces(triangle_tree(mesh), points, MOST_MM)
     near = nearest < MOST_MM
     assert distances == pytest.approx(np.minimum(nearest, MOST_MM), abs=1e-9)
     assert away[near, faces[near]] == pytest.approx(nearest[near], abs=1e-9)
     within = windings(points, mesh) > 0.5
-    assert outside_mm(points, mesh, MOST_MM) == pytest.approx(np.where(within, 0.0, np.minimum(nearest, MOST_MM)), abs=1e-9)
+    assert outside_mm(points, triangle_tree(mesh), MOST_MM) == pytest.approx(
+        np.where(within, 0.0, np.minimum(nearest, MOST_MM)), abs=1e-9
+    )
 
 
 def test_no_points_have_no_distance() -> None:
-    assert outside_mm(np.zeros((0, 3)), box(), 5.0).shape == (0,)
+    assert outside_mm(np.zeros((0, 3)), triangle_tree(box()), 5.0).shape == (0,)
 
 
 @settings(max_examples=15)

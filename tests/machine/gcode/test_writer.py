@@ -189,6 +189,12 @@ def test_the_blocks_stand_around_every_turn_with_their_placeholders_filled() -> 
     assert re.fullmatch(r"M117 part 2 of 2 at A90 C-?90 from Z[0-9.]+", lines[turn - 1])
 
 
+def test_the_block_after_a_part_stands_behind_each_part_and_nowhere_else() -> None:
+    lines = list(write_gcode(printed()[3], _with_block("after_part", "M117 done")))
+    places = [line for line in lines if line == "M117 done" or line.startswith((";PART:", ";PAUSE:"))]
+    assert places == [";PART:1 of 2", "M117 done", ";PART:2 of 2", "M117 done"]
+
+
 def test_the_block_before_a_layer_stands_before_every_layer_with_its_number_and_height() -> None:
     sliced = [layer for part in printed()[2] for layer in part.layers]
     lines = list(write_gcode(printed()[3], _with_block("before_layer", "M117 {layer_num} at {layer_z} of {max_layer_z}")))

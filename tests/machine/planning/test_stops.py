@@ -46,6 +46,12 @@ def test_the_tip_waits_above_all_that_stands_there_with_the_filament_pulled_back
     assert lines[at - 3].endswith("E-0.80000 F5250")
 
 
+def test_a_pause_is_not_the_end_of_its_part() -> None:
+    lines = written("marlin", ["1:3", "2:2"], [], 'machine.gcode.after_part="M117 done"')
+    places = [line.split(" ")[0] for line in lines if line == "M117 done" or line.startswith(";PART:") or ";PAUSE:" in line]
+    assert places == [";PART:1", "M0", "M117", ";PART:2", "M0", "M117"]
+
+
 @pytest.mark.parametrize(
     ("pause", "sentence"),
     [

@@ -3,6 +3,7 @@
 import errno
 import grp
 import os
+from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
@@ -14,14 +15,18 @@ from machine.dryrun.dryrun import dry_run
 from machine.gcode.settings import foot
 from machine.link.identification import Answer, Kind, ask
 from machine.link.port import open_port
+from machine.link.print_state import PrintState, PrintStatus
 from machine.pipeline.programs import LoadedProgram
 from machine.printing import ports
 from machine.printing.checks import (
     check,
     check_destination,
+    check_free,
+    check_idle,
     check_machine,
     exceeded_limit,
     firmware_mismatch,
+    lacking_macros,
     machine_mismatch,
     machine_sentences,
     program_sentences,
@@ -30,7 +35,7 @@ from machine.printing.destination import SerialPort
 from machine.printing.servers.server import Identity
 from machine.program import Program
 from machine.simulator.simulator import SimulatedPrinter
-from profiles.errors import PrinterError
+from profiles.errors import PrinterError, ServerError
 from profiles.messages import terminal_words
 from profiles.profile import load
 from tests.machine.peers import PATIENCE_S, behind_rfc2217, hear_out, on_terminal, scripted
@@ -304,6 +309,24 @@ def test_force_goes_past_another_firmware_and_says_so(capsys: pytest.CaptureFixt
     assert not check(machine_sentences(klipper, MACHINE), force=True)
     assert "the printer's firmware is Klipper" in capsys.readouterr().err
     assert check(machine_sentences(Identity(""), MACHINE), force=False)
+
+
+def test_a_klipper_without_a_macro_is_refused_unless_that_only_shows_a_message() -> None:
+    klipper = Identity("", commands=frozenset({"G28", "M117"}))
+    assert lacking_macros(klipper, ["SET_DISPLAY_TEXT MSG=hello", "HOME_AB"]) == ["HOME_AB"]
+    assert lacking_macros(Identity(""), ["HOME_AB"]) == []  # what it has is not known
+
+
+@pytest.mark.parametrize("refuse", [check_free, check_idle])
+@pytest.mark.parametrize(("state", "sentence"), [
+    (PrintState.OFFLINE, "its server cannot .* now: no cable"), (PrintState.PRINTING, "its server is printing b now"),
+])  # fmt: skip
+def test_a_server_is_free_only_with_a_printer_that_prints_nothing(
+    refuse: Callable[[str, PrintStatus], None], state: PrintState, sentence: str
+) -> None:
+    refuse("its server", PrintStatus(PrintState.READY))
+    with pytest.raises(ServerError, match=sentence):
+        refuse("its server", PrintStatus(state, file="b", message="no cable"))
 
 
 @pytest.mark.parametrize(("coordinates", "refused"), [("table", True), ("workpiece", False)])

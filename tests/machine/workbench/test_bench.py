@@ -45,6 +45,13 @@ def test_a_face_that_is_laid_down_looks_down() -> None:
         assert np.linalg.det(rotation) == pytest.approx(1.0)
 
 
+def test_one_copy_is_a_number_of_copies_and_none_is_not() -> None:
+    three = changed(history(), "copies", count=3)
+    assert [steps.now.bench.copies for steps in (three, changed(three, "copies", count=1))] == [3, 1]
+    with pytest.raises(PlanError, match="is 0: 1 to 1000 is allowed"):
+        changed(three, "copies", count=0)
+
+
 def test_everything_is_undone_and_done_again() -> None:
     searched = with_front(history().now.bench, FRONT)
     steps = history().do("find parts", searched)

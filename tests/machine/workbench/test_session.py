@@ -456,6 +456,30 @@ def test_a_stop_reaches_work_that_still_waits_for_its_turn() -> None:
     ]
 
 
+def test_a_stop_ends_a_comparison_that_still_waits_for_its_turn() -> None:
+    async def work(session: Session) -> None:
+        async with session.turn:
+            for name in ("compare", "stop"):
+                obey(session, {"do": name})
+        await settled(session)
+
+    session = when_done(work)
+    assert (session.stopped, session.problem) == ("The comparison was stopped: nothing of it is kept.", "")
+
+
+@pytest.mark.parametrize("given", [{}, {"ranker": ""}, {"ranker": "  "}, {"ranker": " classic "}])
+def test_a_search_without_the_name_of_a_ranker_is_a_classic_one(given: dict[str, str], monkeypatch: pytest.MonkeyPatch) -> None:
+    rankers: list[str] = []
+
+    async def work(session: Session) -> None:
+        monkeypatch.setattr(session.finding, "search", lambda orient, ranker: rankers.append(ranker))
+        obey(session, {"do": "search", **given})
+        await settled(session)
+
+    when_done(work)
+    assert rankers == ["classic"]
+
+
 def test_prices_go_on_while_the_bench_changes_in_what_does_not_decide_them_and_a_front_that_was_found_has_its_own() -> None:
     rows = (FrontRow((), 9.0, 0.0, 9.0), FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0, chosen=True))
     priced: list[int] = []

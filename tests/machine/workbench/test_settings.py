@@ -21,13 +21,14 @@ from machine.workbench.bench.settings import (
     with_name,
     with_setting,
     with_typed,
+    without_settings,
 )
 from mdp.pose import UP, about, turned_by
 from mdp.search.plan_file import PlannedPart
 from profiles.errors import PlanError, ProfileError
 from profiles.messages import terminal_words
 from profiles.part_settings import OF_PARTS_ON_PLASTIC
-from profiles.profile import SECTIONS, load
+from profiles.profile import DEFAULTS, SECTIONS, load
 from profiles.wording import keys
 from tests.machine.workbench.models import changed, changed_bench, model
 
@@ -74,6 +75,17 @@ def test_every_key_can_be_typed_and_what_is_told_of_it_is_taken_back_as_the_same
             given = with_setting(given, row["key"], row["value"] if row["kind"] == "rows" else json.dumps(row["value"]))
     assert profile_as_given(given, load()) == load()
     assert not any("\n" in setting for setting in given.settings)
+
+
+def test_the_settings_of_one_kind_are_taken_back_and_those_of_the_others_stay() -> None:
+    given = replace(USUAL, settings=("machine.tilt.sign=-1", "material.nozzle_c=215", "process.walls=3", "search.directions=9"))
+    left = {kind: [key.partition(".")[0] for key in without_settings(given, kind).settings] for kind in (*DEFAULTS, None)}
+    assert left == {
+        "machine": ["material", "process", "search"],
+        "material": ["machine", "process", "search"],
+        "process": ["machine", "material"],
+        None: [],
+    }
 
 
 def test_a_block_names_its_placeholders_and_one_that_cannot_be_filled_in_is_refused() -> None:

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from mdp.mesh import Floats, Mesh
-from mdp.sweep.rays import nearest_faces
+from mdp.sweep.rays import nearest_faces, triangle_tree
 from mdp.sweep.slivers import OPPOSITE_COSINE, thin_faces
 from mdp.sweep.sweep import Remainder
 from tests import shapes
@@ -41,5 +41,5 @@ def test_distances_are_those_of_trimesh(mesh: Mesh) -> None:
     triangles = mesh.vertices[mesh.faces]
     nearest = [trimesh.triangles.closest_point(triangles, np.tile(place, (len(triangles), 1))) - place for place in places]
     expected = [np.linalg.norm(off, axis=1).min() for off in nearest]
-    assert nearest_faces(mesh, places, 1e3)[0] == pytest.approx(expected, abs=1e-9)
-    assert nearest_faces(mesh, places, 2.0)[0] == pytest.approx(np.minimum(expected, 2.0), abs=1e-9)
+    assert nearest_faces(triangle_tree(mesh), places, 1e3)[0] == pytest.approx(expected, abs=1e-9)
+    assert nearest_faces(triangle_tree(mesh), places, 2.0)[0] == pytest.approx(np.minimum(expected, 2.0), abs=1e-9)

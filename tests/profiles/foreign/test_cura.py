@@ -63,6 +63,13 @@ def test_the_first_extruder_that_is_switched_on_is_read(tmp_path: Path) -> None:
     assert config_inside(file).number("perimeters") == 3
 
 
+def test_a_byte_order_mark_at_the_head_of_a_container_is_no_part_of_it(tmp_path: Path) -> None:
+    file = project(tmp_path / "a.3mf", {}, {"b.extruder": ("position = 0", ["own"])})
+    with ZipFile(file, "a") as archive:
+        archive.writestr("Cura/own.inst.cfg", "\ufeff[values]\nwall_line_count = 3\n")
+    assert config_inside(file).number("perimeters") == 3
+
+
 def test_a_material_says_its_kind_and_temperature_below_what_a_person_has_set(tmp_path: Path) -> None:
     stacks = {"a.extruder": ("position = 0", ["user", "petg_acme_printer_0.4"])}
     config = config_inside(project(tmp_path / "a.3mf", {"user": "material_bed_temperature = 70"}, stacks))

@@ -9,7 +9,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import pytest
 
 from profiles.errors import ProfileError
-from profiles.foreign.read import read_config
+from profiles.foreign.read import read_config, read_slicer_settings
 
 BUNDLE = """
 [print:*common*]
@@ -37,6 +37,20 @@ def written(folder: Path, name: str, text: str) -> Path:
 def test_a_config_ini_is_read_line_by_line(tmp_path: Path) -> None:
     config = read_config(written(tmp_path, "config.ini", "# by hand\nlayer_height = 0.15\nfilament_settings_id = ours\n"))
     assert (config.number("layer_height"), config.material) == (0.15, "ours")
+
+
+@pytest.mark.parametrize(("name", "text"), [
+    ("config.ini", "layer_height = 0.15\nfilament_settings_id = ours\n"),
+    ("mine.json", '{"type": "process", "name": "mine", "layer_height": "0.15"}'),
+])  # fmt: skip
+def test_a_byte_order_mark_at_the_head_of_a_file_is_no_part_of_it(name: str, text: str, tmp_path: Path) -> None:
+    assert read_config(written(tmp_path, name, f"\ufeff{text}")).number("layer_height") == 0.15
+
+
+def test_a_byte_order_mark_at_the_head_of_the_settings_in_a_slicer_file_is_no_part_of_them(tmp_path: Path) -> None:
+    with ZipFile(tmp_path / "a.3mf", "w") as archive:
+        archive.writestr("Metadata/project_settings.config", '\ufeff{"wall_loops": "5"}')
+    assert read_slicer_settings(tmp_path / "a.3mf")[0]["wall_loops"] == "5"
 
 
 def test_a_preset_of_a_bundle_has_what_it_inherits(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from machine.cli.cli import main
+from machine.cli.commands.profiles.detection import read_file
 from machine.link.identification import ask_at_any_rate
 from machine.printing import settings_queries
 from machine.printing.servers.http import VARIABLE
@@ -241,3 +242,8 @@ def test_a_profile_that_is_there_is_not_written_over(tmp_path: Path, capsys: pyt
 def test_one_of_file_and_port_is_wanted(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["profiles", "detect"]) == 1
     assert "one of FILE and --port PORT is expected" in capsys.readouterr().err
+
+
+def test_a_byte_order_mark_at_the_head_of_a_configuration_is_no_part_of_it(tmp_path: Path) -> None:
+    (tmp_path / "own.cfg").write_text("\ufeff[printer]\r\nkinematics: none\r\n", "utf-8", newline="")
+    assert read_file(tmp_path / "own.cfg").text == "[printer]\nkinematics: none\n"

@@ -36,6 +36,11 @@ def test_a_wrong_csv_is_refused(tmp_path: Path) -> None:
         read_sheet(tmp_path / "sheet.csv")
 
 
+def test_a_csv_with_a_byte_order_mark_is_read_as_without(tmp_path: Path) -> None:
+    (tmp_path / "sheet.csv").write_text("\ufefftilt_deg,turn_deg,x_mm,y_mm,z_mm,on\n30,0,1,2,3,plate\n", "utf-8")
+    assert [touch.at_mm for touch in read_sheet(tmp_path / "sheet.csv").touches] == [(1.0, 2.0, 3.0)]
+
+
 def test_an_empty_sheet_holds_no_touch(tmp_path: Path) -> None:
     machine = machine_of("generic_ac")
     (tmp_path / "sheet.toml").write_text(sheet_text("generic_ac", machine, plan_touches(machine, 20.0)))

@@ -448,6 +448,7 @@ def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
     ({"do": "ports", "baud": None}, "baud is null: it must be a whole number"),
     ({"do": "check", "port": ["sim"]}, "port is .*: it must be a text"),
     ({"do": "hand", "port": "sim", "sim_speed": float("nan")}, "sim_speed is nan: it must be a number"),
+    ({"do": "hand", "port": "sim", "sim_speed": float("inf")}, "sim_speed is inf: it must be a number"),
     ({"do": "by_hand", "print": 1, "does": "dance"}, "does is .dance."),
     ({"do": "by_hand", "print": 1, "does": "jog", "by_mm": 10**400}, "by_mm is 1000"),
     ({"do": "begin", "print": "1"}, "print is .1.: it must be a whole number"),
