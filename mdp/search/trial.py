@@ -94,6 +94,7 @@ class Trials:
         self._node = root = problem.root  # after the cuts of the last trial
         self._surface = Forecast.of(root.remainder, problem.terms, root.seam_weights)
         self._keys: list[Key] = []  # of the planes of these cuts, as they were given
+        self.uncut_support_mm2 = self._surface.parts([])[1]  # of the model in one piece
 
     def attempt(self, planes: Sequence[Plane], most_cuts: float = inf) -> Trial:
         """Try the base planes of the parts from the second, in print order. most_cuts: limit on the number of cuts made; parts

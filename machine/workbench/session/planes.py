@@ -11,7 +11,7 @@ from machine.workbench.bench.bench import Bench, with_cuts, with_zones
 from machine.workbench.bench.changes import Cuts, Edit, check_unlocked, planned_part, snap
 from machine.workbench.bench.values import Asked, vector_of
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
-from machine.workbench.work.cutting import load_kernels, make_ready, near_neck, nearest, try_cuts
+from machine.workbench.work.cutting import load_kernels, make_ready, near_neck, nearest, support_uncut, try_cuts
 from machine.workbench.work.models import Resting, Standing, mark, rank_resting, stand
 from mdp.read import MANY_FACES
 from mdp.search.neck import REACH_DEG, REACH_SHARE
@@ -211,9 +211,9 @@ class PlaneTrials:
         """What decides which area needs support in one piece; None where it is not worked out by itself."""
         return None if bench.model is None or bench.model.faces > MANY_FACES else bench.sought
 
-    async def _try_uncut(self, bench: Bench) -> float | None:
+    async def _try_uncut(self, bench: Bench) -> float:
         await self._readiness.wait()
-        return (await self.attempt(bench, ())).support_area_mm2
+        return await self._readiness.ask(support_uncut, bench)
 
     async def mark(self, word: str, marking: Callable[[Bench], Zones]) -> None:
         """Apply other zones; removes planes that they forbid, and reports why. word: name of the history step. Raises PlanError

@@ -258,6 +258,11 @@ def try_cuts(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...
     return _trials(number, bench).attempt(_planes(cuts), most_cuts)
 
 
+def support_uncut(tell: Tell, number: int, bench: Bench) -> float:
+    """The area of the model in one piece that needs support, mm2."""
+    return _trials(number, bench).uncut_support_mm2
+
+
 def near_neck(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], part: int, reach_mm: float) -> Plane | None:
     """The neck near the plane of a part, from `Trials.neck`."""
     return _trials(number, bench).neck(_planes(cuts), part, reach_mm)

@@ -36,7 +36,7 @@ export function modelPanel() {
     listIn("model-notes", model.notes);
     tellTiny(model);
     tellFile(model);
-    if (area !== null) tell({ overhang: mm2(area), needing: needing === null ? "" : `, of which ${mm2(needing)} need support` });
+    if (area !== null) tell({ overhang: mm2(area), needing: needing === null || mm2(needing) === mm2(area) ? "" : `, of which ${mm2(needing)} need support` });
   });
   subscribe(tellModel);
 }
