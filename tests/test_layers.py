@@ -34,6 +34,7 @@ CONFINED = {
     "onnxruntime": ("mdp/ranking/",),
     "serial": ("machine/link/port.py",),
     "httpx": ("machine/printing/servers/http.py",),
+    "segno": ("machine/workbench/access/",),
     "starlette": ("machine/workbench/", "machine/view/serving/"),
     "uvicorn": ("machine/workbench/", "machine/view/serving/"),
     "websockets": (),

@@ -144,6 +144,7 @@ def slice_it(browser: Browser) -> None:
     browser.click("#slice")
     done = "$('slicing-bar').hidden && !['no-slices', 'stale'].some((word) => document.body.classList.contains(word))"
     browser.wait(done)  # not for the bar before it: a little model is sliced sooner than one looks
+    browser.value("$('leave-print').hidden || $('leave-print').click()")
 
 
 def test_parts_appear_are_compared_looked_at_and_marked_when_the_bench_changes(browser: Browser, bench: Running) -> None:

@@ -35,7 +35,7 @@ def test_what_the_page_prints_the_command_line_prints_from_its_plan(tmp_path: Pa
         browser.wait("document.querySelectorAll('#parts-list input[type=radio]').length >= 2")
         browser.click("#parts-list input[type=checkbox]:not(:checked)")
         browser.wait("$('undo').getAttribute('aria-label').startsWith('undo: lock')")
-        browser.click("#parts-list tr:last-child input[type=radio]")
+        browser.click("#parts-list .card:last-child input[type=radio]")
         browser.wait("!$('plane').hidden && !$('handles').hidden")
         before = float(browser.value("$('plane-offset').value"))
         browser.value("$('hand-along').focus()")

@@ -121,7 +121,7 @@ def test_firefox_drags_tilts_and_locks_a_plane_and_finds_the_others_beside_a_mar
     firefox.click("#find-others")
     firefox.wait(f"{FOUND} && {done('find parts')}")
     assert firefox.value("document.querySelectorAll('#parts-list input[type=checkbox]:checked').length") == 1
-    firefox.click("#parts-list tr:has([type=checkbox]:checked) input[type=radio]")
+    firefox.click("#parts-list .card:has([type=checkbox]:checked) input[type=radio]")
     firefox.wait("!$('plane').hidden")
     assert firefox.value("JSON.stringify([$('plane-offset').value, $('plane-tilt').value])") == locked
     assert firefox.complaints == []
@@ -158,7 +158,6 @@ def test_firefox_slices_goes_to_a_finding_and_follows_layers_and_text(firefox: F
     firefox.wait("document.body.classList.contains('stale')")
     firefox.click("#slice")
     firefox.wait(SLICED)
-    firefox.click("#look")
     firefox.wait(f"{VIEW}?.location.href.endsWith($('print-page').getAttribute('src')) && {DRAWN}")
     firefox.value(f"{VIEW}.getElementById('tab-code').click()")
     firefox.wait(f"{VIEW}.querySelector('#code-seen .now')")

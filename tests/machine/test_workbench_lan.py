@@ -222,6 +222,7 @@ def test_from_the_phone_a_model_is_turned_and_a_print_stopped(bench: OpenToNetwo
     browser.click("#tab-slices")
     browser.click("#slice")
     browser.wait("!document.body.classList.contains('no-slices')")
+    browser.click("#leave-print")
     browser.click("#tab-printing")
     browser.value("$('sim-speed').value = '1'")
     browser.click("#check")

@@ -1,7 +1,8 @@
-"""Make the demo models: `python tools/docs/make_demos.py [FOLDER]` writes mdp/demos/NAME.ply.
+"""Makes the models that ship with the program: `python tools/docs/make_demos.py [FOLDER]` writes mdp/demos/NAME.ply and
+NAME.png, the small picture that the workbench shows where nothing is open.
 
-Every model is one closed solid on a flat base about the z axis whose limbs need several printing directions. The organic ones are
-level sets of smoothly united round cones, the others exact boolean unions of cylinders and bars.
+Every model is one closed solid standing on a flat base about the z axis whose limbs need several printing directions.
+The organic ones are level sets of smoothly united round cones, the others exact boolean unions of cylinders and bars.
 """
 
 import math
@@ -14,7 +15,10 @@ from pathlib import Path
 import manifold3d as m3
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image
 
+from machine.pipeline.pictures import PLAIN
+from machine.pipeline.raster import draw
 from mdp.kernels.kernel import kernel
 from mdp.plane import Plane
 from mdp.read import read_mesh
@@ -23,6 +27,7 @@ from mdp.search.plan_writing import plan_text
 from tools.docs.harness import ROOT
 
 FOLDER = ROOT / "mdp" / "demos"
+PICTURE_SIZE, PICTURE_COLOURS = (136, 102), 32
 Point = tuple[float, float, float]
 Knot = tuple[float, float, float, float]
 Limb = list[Knot]  # x, y, z, radius of the knots of a chain of round cones
@@ -292,6 +297,13 @@ def write_plan(folder: Path, name: str) -> None:
     (folder / f"{name}.toml").write_text(plan_text(plan), encoding="utf-8")
 
 
+def write_picture(folder: Path, name: str) -> None:
+    """Write the small picture of a demo beside it."""
+    mesh, _ = read_mesh(folder / f"{name}.ply")
+    picture = Image.fromarray(draw([mesh], [PLAIN], size=PICTURE_SIZE)).quantize(PICTURE_COLOURS)
+    picture.save(folder / f"{name}.png", optimize=True)
+
+
 def main(folder: Path, names: Sequence[str] = tuple(DEMOS)) -> None:
     """Write demos into the folder and report them."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -303,6 +315,8 @@ def main(folder: Path, names: Sequence[str] = tuple(DEMOS)) -> None:
         (folder / f"{name}.ply").write_bytes(ply(vertices, faces))
         if name in LEANS:
             write_plan(folder, name)
+        else:
+            write_picture(folder, name)
         size = np.ptp(vertices, axis=0)
         print(f"{name}: {len(faces)} faces, {size[0]:.1f} x {size[1]:.1f} x {size[2]:.1f} mm, {again.volume():.0f} mm3")
 

@@ -45,7 +45,7 @@ def table(section: str) -> str:
 
 
 def _given(model: Any, key: str) -> str:
-    """What the default profile gives for a key that every profile must give; "" for what does not fit a cell."""
+    """The value that the default profile gives for a key that every profile must give; "" for what does not fit a cell."""
     for step in key.split(".")[1:]:
         model = getattr(model, step)
     text = json.dumps(model, default=lambda value: value.model_dump())

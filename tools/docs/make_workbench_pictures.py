@@ -35,12 +35,12 @@ STEPS = (
     Step("model", (), SHOWN),
     Step("finding", ("#tab-parts", "#find"), "document.documentElement.hasAttribute('data-searching')"),
     Step("parts", (), FOUND),
-    Step("plane", ("#parts-list tbody tr:last-child input",), "!document.getElementById('plane').hidden"),
+    Step("plane", ("#parts-list .card:last-child input",), "!document.getElementById('plane').hidden"),
     Step("settings", ("#tab-settings",), "document.querySelectorAll('[data-key]').length > 10"),
     Step("slicing", ("#tab-slices", "#slice"), "document.getElementById('slice').disabled"),
-    Step("sliced", (), "!document.body.classList.contains('no-slices')"),
-    Step("look", ("#look",), "!document.getElementById('print-page').hidden"),
-    Step("checks", ("#look", "#tab-printing", "#check"), "!document.getElementById('run-ask').hidden"),
+    Step("look", (), "!document.getElementById('print-page').hidden"),
+    Step("sliced", ("#leave-print",), "document.getElementById('print-page').hidden"),
+    Step("checks", ("#tab-printing", "#check"), "!document.getElementById('run-ask').hidden"),
     Step("printing", ("#begin",), "document.documentElement.dataset.printing === 'printing'"),
 )
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from time import monotonic, time
 from typing import Any
 
+import segno
 from starlette.responses import HTMLResponse
 
 from machine.view.page import hash_source
@@ -194,6 +195,7 @@ class Door(Observable):
         return {
             "version": self.version,
             "addresses": self._addresses,
+            "qr_code": segno.make(self._addresses[0], micro=False).svg_data_uri(border=1),  # without the code
             "encrypted": self.encrypted,
             "closed": self.pairing.closed,
             "waits_until_s": time() + self.wait_s if self.wait_s else 0.0,  # since the epoch, because a page may receive it late

@@ -122,17 +122,17 @@ class History:
         ]
         return History(Step(word, after, gone_in_words(word, lost)), _nearest_steps((*self.before, self.now)[-MOST_STEPS:]))
 
-    def undo(self) -> "History":
-        """One step back; unchanged if there is none."""
-        if not self.before:
+    def undo(self, count: int = 1) -> "History":
+        """Steps back, as far as there are some."""
+        if not self.before or count < 1:
             return self
-        return History(self.before[-1], self.before[:-1], (*self.undone, self.now))
+        return History(self.before[-1], self.before[:-1], (*self.undone, self.now)).undo(count - 1)
 
-    def redo(self) -> "History":
-        """One step forward; unchanged if there is none."""
-        if not self.undone:
+    def redo(self, count: int = 1) -> "History":
+        """Steps forward again, as far as there are some."""
+        if not self.undone or count < 1:
             return self
-        return History(self.undone[-1], (*self.before, self.now), self.undone[:-1])
+        return History(self.undone[-1], (*self.before, self.now), self.undone[:-1]).redo(count - 1)
 
 
 def _nearest_steps(steps: tuple[Step, ...]) -> tuple[Step, ...]:

@@ -46,12 +46,14 @@ def check_need(session: Session, need: Need) -> None:
         raise PlanError(sentence)
 
 
-def undo(session: Session) -> None:
-    session.advance(session.history.undo())
+def undo(session: Session, *, count: int = 1) -> None:
+    """So many steps back; as many as there are where that is less."""
+    session.advance(session.history.undo(count))
 
 
-def redo(session: Session) -> None:
-    session.advance(session.history.redo())
+def redo(session: Session, *, count: int = 1) -> None:
+    """The same forward again."""
+    session.advance(session.history.redo(count))
 
 
 def dismiss(session: Session) -> None:

@@ -1,9 +1,11 @@
 """Server: the page, and the routes for models, files and websockets of its sessions, and for the benches."""
 
 import asyncio
+import base64
 import re
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from importlib.resources import files
 from pathlib import Path
 from urllib.parse import quote
 
@@ -42,7 +44,7 @@ from profiles.places import KINDS, known
 
 Act = Callable[[Session, Request], Awaitable[Response]]
 OWN = Path(__file__).parent / "page"
-MARKER = re.compile(r"/\*(?:STYLE|SCRIPT|NETWORK)\*/")
+MARKER = re.compile(r"/\*(STYLE|SCRIPT|NETWORK|DEMO)(?: (\w+))?\*/")
 ZIP, BYTES = "application/zip", "application/octet-stream"
 BELOW = "/{token}/{session:int}/"
 
@@ -147,9 +149,15 @@ def workbench_page(lines: Iterable[str], network: str = "") -> tuple[bytes, str]
     """The page and its content security policy. lines: websocket origins of the server; network: "open" for this computer's page
     if the network is open, "paired" for the page of a device."""
     style, script = "".join((folder / "style.css").read_text("utf-8") for folder in (TEMPLATE, OWN)), bundle(OWN / "main.js")
-    put = {"/*STYLE*/": style, "/*SCRIPT*/": script, "/*NETWORK*/": network}
-    body = MARKER.sub(lambda match: put[match[0]], (OWN / "page.html").read_text("utf-8"))
+    put = {"STYLE": style, "SCRIPT": script, "NETWORK": network}
+    page = (OWN / "page.html").read_text("utf-8")
+    body = MARKER.sub(lambda match: _demo_picture(match[2]) if match[2] else put[match[1]], page)
     return body.encode(), policy(style, script, lines)
+
+
+def _demo_picture(name: str) -> str:
+    """The small picture of a demo model as an address."""
+    return f"data:image/png;base64,{base64.b64encode((files('mdp.demos') / f'{name}.png').read_bytes()).decode()}"
 
 
 def policy(style: str, script: str, lines: Iterable[str]) -> str:

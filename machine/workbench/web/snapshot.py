@@ -12,7 +12,7 @@ from machine.program import Alternative
 from machine.quantities import about, duration, filament_g, newtons, percent, price_in_words
 from machine.view.parts import front_record, page_colours
 from machine.view.scene import machine_bodies
-from machine.workbench.bench.bench import Bench
+from machine.workbench.bench.bench import Bench, Step
 from machine.workbench.bench.changes import Cuts
 from machine.workbench.bench.model import Model
 from machine.workbench.session.commands import Need, lacking
@@ -28,6 +28,7 @@ from profiles.material import Material
 from profiles.messages import advice, terminal_words
 from profiles.profile import Profile
 
+MOST_STEPS_LISTED = 30  # of those that can be undone, or done again
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 MOST_FACES = 2_000_000  # limit for drawing
 SAME_UP = 1e-6  # between the directions of two orientations that differ by a turn about z
@@ -164,6 +165,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "undo": terminal_words(history.now.word) if history.before else "",
         "redo": terminal_words(history.undone[-1].word) if history.undone else "",
+        "steps": {"undo": _words((*history.before, history.now)[1:]), "redo": _words(history.undone)},
         "model": None if bench.model is None else _model(bench.model, session),
         "rotation": bench.rotation,
         "scale": bench.profile.process.scale,
@@ -220,6 +222,11 @@ def _resting(session: Session) -> list[dict[str, Any]]:
         now = Resting(bench.rotation, "as it lies now", standing.overhang_mm2, standing.size_mm[2])
         rows.insert(0, asdict(now) | {"present": True})
     return rows
+
+
+def _words(steps: Sequence[Step]) -> list[str]:
+    """What the last steps of a history did, the nearest first."""
+    return [terminal_words(step.word) for step in steps[::-1][:MOST_STEPS_LISTED]]
 
 
 def _copies_told(session: Session) -> str:

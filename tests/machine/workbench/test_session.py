@@ -128,6 +128,19 @@ def test_figures_follow_the_hand_at_once_and_what_else_is_cut_is_looked_at_when_
     assert tried == [(held, 0, 80.0), (newest, 1, 80.0), (newest, 0, 80.0)]
 
 
+def test_one_command_goes_several_steps_back_or_forward_as_far_as_there_are_some() -> None:
+    async def work(session: Session) -> None:
+        for deg in (10, 20, 30):
+            obey(session, {"do": "turn", "axis": "x", "deg": deg})
+        obey(session, {"do": "undo", "count": 2})
+
+    session = when_done(work)
+    assert snapshot(session)["steps"] == {"undo": ["turn the model", "open a"], "redo": ["turn the model", "turn the model"]}
+    assert len(session.history.redo(2).before) == 4
+    assert session.history.undo(10**9).undo(1).before == ()
+    assert session.history.undo(0) is session.history.redo(-1) is session.history
+
+
 def test_a_turn_that_is_asked_for_while_an_edit_is_tried_comes_after_it() -> None:
     async def work(session: Session) -> None:
         obey(session, {"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})

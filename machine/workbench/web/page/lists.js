@@ -1,6 +1,6 @@
 // Lists: texts, lists and rows of the panels, made anew only where what they tell is new.
 
-import { $, button, made, rowOf, termsOf } from "../../../view/template/elements.js";
+import { $, button, made, termsOf } from "../../../view/template/elements.js";
 
 export const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
 export const newtons = (force) => `${Number(force.toPrecision(2))} N`;
@@ -12,15 +12,14 @@ export const fill = (field, value) => { if (document.activeElement !== field) fi
 /** A button of a row that takes away what it stands for. */
 export const removeButton = (words, onclick) => button("×", onclick, { title: words, ariaLabel: words });
 
-/** Children of an element, made() where what they tell is new: what has not changed stays, and what is selected in it; a choice of a list
- * that had the keyboard has it again. */
+/** Children of an element, made() where what they tell is new; a choice or a switch that had the keyboard has it again. */
 export function putNew(element, told, made) {
   const fresh = JSON.stringify(told), held = document.activeElement;
   if (element.dataset.shown === fresh) return;
   element.dataset.shown = fresh;
   const name = held && element.contains(held) ? held.name : "";
   element.replaceChildren(...made());
-  if (name) element.querySelector(`[name=${name}]:checked`)?.focus();
+  if (name) (element.querySelector(`[name="${name}"]:checked`) || element.querySelector(`[name="${name}"]`))?.focus();
 }
 
 /** Pairs of a name and a text, and of a class where the text has one. */
@@ -53,13 +52,6 @@ export const putTable = (table, told, head, rows) => putNew(table, told, () => {
   const body = rows(), titles = made("tr", {}, ...head.map((text) => (text ? made("th", { text, scope: "col" }) : made("td"))));
   return body.length ? [...(head.length ? [made("thead", {}, titles)] : []), made("tbody", {}, ...body)] : [];
 });
-
-/** A row that is chosen by its radio button, in the label of which its name stands, or by a click. */
-export function choiceRow(name, value, checked, label, cells, choose) {
-  const mark = made("input", { type: "radio", name, value, checked, onchange: choose }), row = rowOf([made("label", {}, mark, ...label), ...cells]);
-  row.onclick = ({ target }) => { if (!["INPUT", "LABEL", "BUTTON"].includes(target.tagName)) choose(); };
-  return row;
-}
 
 /** Buttons, one a unit, that say what a model's coordinates are in. */
 export const unitButtons = (row, words, choose) => putNew(row, words, () => words.map((unit) => button(`in ${unit}`, () => choose(unit))));

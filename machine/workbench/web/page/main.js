@@ -1,6 +1,6 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, disable, duration, hide, listen, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
+import { $, button, disable, duration, hide, listen, made, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
 import { putNew, unitButtons, withWholeOptions } from "./lists.js";
@@ -22,7 +22,7 @@ import { sectionView } from "./scene/section-view.js";
 import { settingsPanel } from "./settings/settings-panel.js";
 import { saveMenu } from "./slice/save-menu.js";
 import { comparePanel, slicesPanel, stopsPanel, wallsOf } from "./slice/slices-panel.js";
-import { keptLook, onState, store, subscribe, update } from "./store.js";
+import { keptLook, onNew, onState, store, subscribe, update } from "./store.js";
 
 function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera), root = document.documentElement;
@@ -45,7 +45,7 @@ function main() {
   subscribe(onlyWithLine);
   onState(({ note }) => notice(note, "note"));
   slicesPanel(printFrame(camera, picture));
-  const panels = [problemLine, elapsedTimes, benchesPanel, devicesPanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
+  const panels = [problemLine, elapsedTimes, historyMenu, previewOf, benchesPanel, devicesPanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
   for (const begin of [...panels, printPanel, clicksOf, modelOf, placePanel, thumbnailsOf, apartPanel]) begin(picture);
   if (picture) {
     const ringPlaces = ringsOf(picture);
@@ -62,6 +62,8 @@ function main() {
   }
   keysOf(camera, picture);
   onData("do", ({ do: name }) => send({ do: name }));
+  onData("demo", ({ demo: name }) => send({ do: "demo", name }));
+  document.querySelectorAll(".menu").forEach((menu) => menu.addEventListener("click", () => menu.hidePopover()));
   root.dataset.state = picture ? "ready" : "failed";
 }
 
@@ -70,7 +72,7 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
   titleOfModel(model ? model.name : "");
   const summary = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : preparing ? "preparing the model for planes …" : `${machine.name} · ${material} · ${process}`;
   tell({ title: model ? model.name : "tiltprint", summary });
-  hide({ drop: Boolean(model) });
+  hide({ drop: Boolean(model || busy) });
   root.dataset.busy = busy;
   root.toggleAttribute("data-searching", Boolean(search));
   toggle("no-model", !model);
@@ -95,6 +97,25 @@ function problemLine() {
   });
 }
 
+/** All steps that can be undone and done again, the newest first; one click goes there. */
+function historyMenu() {
+  const stepTo = (name) => (word, k) => button(word, () => send({ do: name, count: k + 1 }), { className: name });
+  onNew(({ steps }) => steps, ({ undo, redo }) => {
+    $("history-menu").replaceChildren(...redo.map(stepTo("redo")).reverse(), made("b", { text: "now" }), ...undo.map(stepTo("undo")));
+  });
+}
+
+/** A print that this page has had sliced is looked at as soon as it is ready, unless something else is looked at by then. */
+function previewOf() {
+  let wanted = false;
+  listen("click", { slice: () => { wanted = true; update({ looking: false }); $("tab-slices").click(); } });
+  onState(({ slicing, sliced }, before) => {
+    const ended = before?.slicing && !slicing;
+    if (ended && wanted && store.tab === "slices" && sliced?.verdict.kind === "ready") update({ looking: true });
+    wanted &&= !ended;
+  });
+}
+
 const MOMENT_S = 2;
 const WORK = {
   "summary": ({ busy, search, slicing, preparing }) => busy || (search ? "search" : slicing ? "slicing" : preparing ? "planes" : ""),
@@ -115,19 +136,22 @@ function elapsedTimes() {
   setInterval(show, 1000);
 }
 
+const CONTROLS = { z: "undo", y: "redo", r: "slice", g: "save-gcode", o: "open" }; // with Ctrl held
+
 /** What keys do; undo and redo, but where what is typed has an undo of its own. */
 function keysOf(camera, picture) {
   const click = (id) => () => $(id).click();
   onKeys({
     ...viewKeys(camera, picture ? picture.ask : () => {}), f: click("fit"), d: click("theme"), r: click("show-rings"), n: click("neck"), "?": () => $("keys").showModal(),
     Escape: () => update({ clicks: "", corner: null, part: 0, hand: null }),
-  }, () => $("keys").open || document.activeElement?.closest("[data-typing]"));
-  listen("click", { "keys-button": () => $("keys").showModal() });
+  }, () => document.querySelector("dialog[open], :popover-open") || document.activeElement?.closest("[data-typing]"));
+  listen("click", { "keys-button": () => $("keys").showModal(), open: () => $("file").click() });
   addEventListener("keydown", (event) => {
-    const key = event.key.toLowerCase();
-    if (!(event.ctrlKey || event.metaKey) || !["z", "y"].includes(key) || event.target.closest?.("[data-typing]")) return;
+    const name = CONTROLS[event.key.toLowerCase()], steps = ["undo", "redo"].includes(name);
+    if (!(event.ctrlKey || event.metaKey) || event.altKey || !name || (steps ? event.target.closest?.("[data-typing]") : event.shiftKey)) return;
     event.preventDefault();
-    send({ do: event.shiftKey || key === "y" ? "redo" : "undo" });
+    if (steps) send({ do: event.shiftKey ? "redo" : name });
+    else $(name).click();
   });
 }
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import httpx
 import pytest
+import segno
 from starlette.responses import PlainTextResponse
 from starlette.types import Receive, Scope, Send
 
@@ -67,6 +68,13 @@ def test_an_unpaired_device_gets_one_page_without_scripts_and_nothing_else() -> 
                 assert (await device.request(method, "/paired/1/", headers={"origin": OWN})).status_code == 403
 
     asyncio.run(run())
+
+
+def test_the_page_of_the_computer_gets_the_address_without_the_code_as_a_picture_for_the_camera_of_a_phone() -> None:
+    door = Network().door
+    told = door.snapshot()
+    assert told["qr_code"] == segno.make(told["addresses"][0], micro=False).svg_data_uri(border=1)
+    assert told["qr_code"].startswith("data:image/svg+xml;charset=utf-8,%3Csvg")
 
 
 def test_the_code_gives_a_device_a_cookie_of_its_own_and_is_used_up() -> None:

@@ -104,6 +104,7 @@ function openDevicesLine() {
   const line = lineAt("devices", (told) => {
     if (told.problem) return;
     tell({ "network-told": `A device that opens ${told.addresses.join(" or ")} is asked for the code that the terminal shows.${told.encrypted ? "" : " Whoever is in this network can read along."}` });
+    Object.assign($("network-code"), { src: told.qr_code, hidden: false });
     clearTimeout(until);
     tellPairing(told);
     until = setTimeout(tellPairing, Math.max(0, 1000 * told.waits_until_s - Date.now()) + 100, told);

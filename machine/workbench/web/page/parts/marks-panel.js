@@ -1,11 +1,11 @@
 // Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
-import { $, alike, button, listen, made, numberIn, putAt, swatch, tell } from "../../../../view/template/elements.js";
+import { $, alike, button, listen, made, numberIn, putAt, rowOf, swatch, tell } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
 import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { wordOf } from "../../../../view/template/picture/solids.js";
 import { newest, send } from "../line.js";
-import { choiceRow, fill, putTable, removeButton } from "../lists.js";
+import { fill, putTable, removeButton } from "../lists.js";
 import { modelSize } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";
 import { onState, store, subscribe, update } from "../store.js";
@@ -182,7 +182,6 @@ function markRow(zone, chosen) {
   const remove = removeButton(`Remove ${name}`, () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
   const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
     : zone.point_mm ? `faces up to ${zone.angle_deg}°` : zone.faces ? `${zone.faces.toLocaleString("en")} faces` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
-  const row = choiceRow("mark", `${zone.kind} ${zone.number}`, chosen, [swatch(`rgb(${colour})`), word], [where, remove], () => chooseMark(zone));
-  row.querySelector("input").ariaLabel = name;
-  return row;
+  const mark = made("input", { type: "radio", name: "mark", value: `${zone.kind} ${zone.number}`, checked: chosen, ariaLabel: name, onchange: () => chooseMark(zone) });
+  return rowOf([made("label", {}, mark, swatch(`rgb(${colour})`), word), where, remove]);
 }

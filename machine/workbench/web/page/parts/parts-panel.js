@@ -1,14 +1,14 @@
-// Parts panel: the search, its front as a slider, and every part in a row, chosen there as in the picture, with keys and a menu for what is done to it.
+// Parts panel: the search, its front as a slider, and every part as a card, chosen there as in the picture, with keys and a menu for what is done to it.
 
-import { $, alike, button, disable, hide, listen, made, needsKey, partsInWords, roughly, swatch, tell, toggle } from "../../../../view/template/elements.js";
+import { $, alike, button, disable, hide, listen, made, needsKey, partsInWords, roughly, swatch, tell, termsOf, toggle } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
-import { choiceRow, listIn, mm2, newtons, putTable, tellIn } from "../lists.js";
+import { listIn, mm2, newtons, putNew, tellIn } from "../lists.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 import { anglesOf, choosePart, figuresNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
 
 export function partsPanel() {
   listen("click", {
-    find: () => send({ do: "search", orient: $("orient").checked, ranker: $("ranker").value }),
+    find: () => { $("tab-parts").click(); send({ do: "search", orient: $("orient").checked, ranker: $("ranker").value }); },
     recommended: () => send({ do: "take", parts: store.state.recommended }),
   });
   const show = () => {
@@ -58,14 +58,8 @@ export function partsPanel() {
   });
 }
 
-function marksUnder(front, recommended) {
-  $("front-marks").replaceChildren(...front.map(({ parts }, place) => {
-    const best = parts === recommended;
-    const mark = made("span", { text: `${parts}${best ? " ✓" : ""}`, className: best ? "recommended" : "", title: best ? "recommended" : "" });
-    mark.style.left = `${front.length > 1 ? (100 * place) / (front.length - 1) : 0}%`;
-    return mark;
-  }));
-}
+const marksUnder = (front, best) => $("front-marks").replaceChildren(...front.map(({ parts }) => (
+  made("span", parts === best ? { text: `${parts} ✓`, className: "recommended", title: "recommended" } : { text: parts }))));
 
 function tellRow(row) {
   const { recommended, parts, cuts, priced, by_hand: own } = store.state;
@@ -81,8 +75,6 @@ function tellRow(row) {
   ]);
 }
 
-const HEAD = ["part", "cm³", "support mm²", "rim mm", "edge", "joint", "lock"];
-const UNKNOWN = "–";
 const SIDES = ["right", "right and back", "back", "left and back", "left", "left and front", "front", "right and front"];
 
 /** A printing direction as somebody in front of the machine sees it. */
@@ -99,32 +91,32 @@ function partsFigures() {
   return [{ volume_mm3: model.volume_mm3 - sum("volume_mm3"), support_mm2: figures.support_area_mm2 - sum("support_mm2") }, ...others.map((part) => part || {})];
 }
 
-function cellsOf(number, { volume_mm3: volume, support_mm2: support, rim_mm: rim, edge_deg: edge }) {
-  const told = (value, words) => (Number.isFinite(value) ? words(value) : UNKNOWN), own = number > 1 ? told : () => "";
-  const joint = store.pieces?.parts.find(({ part }) => part.index === number)?.part.joint, onchange = ({ target }) => lockPart(number, target.checked);
-  const lock = number > 1 ? made("input", { type: "checkbox", checked: isLocked(number), ariaLabel: `lock the plane of part ${number}`, onchange }) : "";
-  return [
-    told(volume, (mm3) => (mm3 / 1000).toFixed(2)), told(support, (mm2) => Math.max(mm2, 0).toFixed(1)), own(rim, (mm) => mm.toFixed(0)),
-    own(edge, (deg) => `${deg.toFixed(0)}°`), own(joint?.load_n, newtons), lock,
-  ];
+/** What a card tells: icons, names and texts; the first part has neither cut nor joint. */
+function figuresOn(number, { volume_mm3: volume, support_mm2: support, rim_mm: rim, edge_deg: edge }) {
+  const told = (value, words) => (Number.isFinite(value) ? words(value) : "–"), joint = store.pieces?.parts.find(({ part }) => part.index === number)?.part.joint;
+  const own = [["volume", "volume", told(volume, (mm3) => `${(mm3 / 1000).toFixed(2)} cm³`)], ["support", "support", told(support, mm2)]];
+  const cut = [["seam", "seam", told(rim, (mm) => `${mm.toFixed(0)} mm`)], ["edge", "cut edge", told(edge, (deg) => `${deg.toFixed(0)}°`)]];
+  const words = joint ? `${mm2(joint.area_mm2)}, breaks at about ${newtons(joint.load_n)} sideways at the tip${joint.weakest ? ": the weakest" : ""}` : "–";
+  return number > 1 ? [...own, ...cut, [joint?.weakest ? "joint weakest" : "joint", "joint", words]] : own;
 }
 
-function partRow(number, figures) {
-  const direction = planesNow()[number - 2]?.normal || [0, 0, 1];
-  const name = [swatch(store.state.colours[number - 1]), `${number}`];
-  const row = choiceRow("part", number, number === store.part, name, cellsOf(number, figures), () => choosePart(number));
-  row.cells[0].append(made("small", { text: directionInWords(direction), className: "words" }));
-  row.addEventListener("contextmenu", (event) => {
-    event.preventDefault();
-    openMenu(number, event.clientX || row.getBoundingClientRect().left, event.clientY || row.getBoundingClientRect().bottom);
-  });
-  return row;
+/** A part as a card: chosen by a click or the keyboard, its plane locked by a switch. */
+function partCard(number, figures) {
+  const choose = made("input", { type: "radio", name: "part", value: number, checked: number === store.part, onchange: () => choosePart(number) });
+  const words = made("small", { text: directionInWords(planesNow()[number - 2]?.normal || [0, 0, 1]), className: "words" });
+  const locked = isLocked(number), lock = { type: "checkbox", name: `lock-${number}`, checked: locked, className: `lock icon-${locked ? "locked" : "unlocked"}` };
+  const more = { ariaLabel: `lock the plane of part ${number}`, title: "Locked, a search leaves its plane as it is", onchange: ({ target }) => lockPart(number, target.checked) };
+  const rows = figuresOn(number, figures).map(([icon, name, text]) => made("div", { className: `icon-${icon}` }, ...termsOf([[name, text]])));
+  const name = made("label", {}, choose, swatch(store.state.colours[number - 1]), made("span", {}, made("b", { text: `Part ${number}` }), words));
+  const card = made("div", { className: "card" }, name, ...(number > 1 ? [made("input", { ...lock, ...more })] : []), made("dl", {}, ...rows));
+  card.oncontextmenu = (event) => { event.preventDefault(); openMenu(number, event.clientX, event.clientY); };
+  return card;
 }
 
-/** Every part with the plane it stands on in a row, chosen there as in the picture; keys and a menu for what is done to it. */
+/** Every part with the plane it stands on as a card, chosen there as in the picture; keys and a menu for what is done to it. */
 export function partsList() {
   addEventListener("keydown", (event) => {
-    const typing = event.target.closest?.("[data-typing], #marks, dialog");
+    const typing = event.target.closest?.("[data-typing], #marks, dialog, .menu");
     if (!["Delete", "Backspace"].includes(event.key) || typing || needsKey(event) || store.tab !== "parts" || store.part < 2) return;
     event.preventDefault();
     removePart(store.part);
@@ -132,7 +124,7 @@ export function partsList() {
   menuKeys();
   subscribe(({ state, part, pieces }) => {
     const figures = partsFigures();
-    putTable($("parts-list"), [figures, state.locked, state.parts, state.colours, planesNow(), part, Boolean(pieces)], HEAD, () => figures.map((own, k) => partRow(k + 1, own)));
+    putNew($("parts-list"), [figures, state.locked, state.parts, state.colours, planesNow(), part, Boolean(pieces)], () => figures.map((own, k) => partCard(k + 1, own)));
   });
 }
 
@@ -155,30 +147,20 @@ function showSettings(part) {
 export function openMenu(part, x, y) {
   if (!store.state.parts) return;
   choosePart(part);
-  const menu = $("part-menu"), back = document.activeElement;
-  const close = (act) => {
-    menu.hidden = true;
-    if (back?.isConnected) back.focus();
-    act?.();
-  };
-  menu.replaceChildren(...entriesOf(part).map(([text, can, act]) => button(text, () => close(act), { role: "menuitem", disabled: !can })));
+  const menu = $("part-menu");
+  menu.replaceChildren(...entriesOf(part).map(([text, can, act]) => button(text, act, { role: "menuitem", disabled: !can })));
   menu.ariaLabel = `Part ${part}`;
-  menu.close = close;
-  menu.hidden = false;
+  menu.showPopover();
   menu.style.left = `${Math.min(x, innerWidth - menu.offsetWidth - 4)}px`;
   menu.style.top = `${Math.min(y, innerHeight - menu.offsetHeight - 4)}px`;
   menu.querySelector("button:enabled")?.focus();
 }
 
 function menuKeys() {
-  const menu = $("part-menu");
-  addEventListener("pointerdown", ({ target }) => { if (!menu.hidden && !menu.contains(target)) menu.hidden = true; }, true);
-  menu.addEventListener("keydown", (event) => {
-    if (menu.hidden) return; // an entry keeps the focus until the page is drawn anew: that key is the page's
-    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key], all = [...menu.querySelectorAll("button:enabled")];
-    if (step) all[(all.indexOf(document.activeElement) + step + all.length) % all.length].focus();
-    if (["Escape", "Tab"].includes(event.key)) menu.close();
-    if (step || event.key !== "Enter") event.stopPropagation();
-    if (step || event.key === "Tab") event.preventDefault();
+  $("part-menu").addEventListener("keydown", (event) => {
+    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key], all = [...$("part-menu").querySelectorAll("button:enabled")];
+    if (!step) return;
+    all[(all.indexOf(document.activeElement) + step + all.length) % all.length].focus();
+    event.preventDefault();
   });
 }

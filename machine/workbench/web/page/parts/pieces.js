@@ -6,7 +6,6 @@ import { add, bounds, dot, length, mix, scaled, sub } from "../../../../view/tem
 import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/shapes.js";
 import { hex, rgb, solidOf, wordOf } from "../../../../view/template/picture/solids.js";
 import { newest } from "../line.js";
-import { mm2, newtons } from "../lists.js";
 import { faceMet } from "../scene/face-tree.js";
 import { store, subscribe, update } from "../store.js";
 
@@ -79,8 +78,10 @@ export function pieceMet({ parts }, shifts, [from, along]) {
   return met.reduce((best, piece) => (piece.far < best.far ? piece : best), { part: 0, far: Infinity }).part;
 }
 
+const piecesSeen = () => store.pieces && store.tab === "parts" && !store.hand && !store.row && !store.state.search;
+
 /** By which share of the model's size the parts are drawn apart now. */
-export const apartNow = () => (store.pieces && store.tab === "parts" && !store.hand && !store.state.search ? store.apart : 0);
+export const apartNow = () => (piecesSeen() ? store.apart : 0);
 
 export function apartPanel(picture) {
   const keyOf = ({ model, rotation, cuts, given, parts }) => (parts && model.drawn ? JSON.stringify([model.key, rotation, cuts, given]) : "");
@@ -98,15 +99,7 @@ export function apartPanel(picture) {
   subscribe(({ state, tab, pieces, part, apart }, before) => {
     $("apart-line").hidden = !state.parts || !state.model.drawn;
     if (tab === "parts" && !state.search && (state !== before.state || tab !== before.tab)) fetchPieces(keyOf(state), "pieces");
-    picture?.pieces(apartNow() ? pieces : null, pieces ? shiftsOf(pieces, apart) : [], part);
-    $("joint-told").textContent = jointInWords(pieces ? pieces.parts.map(({ part: { joint } }) => joint).filter(Boolean) : [], part);
+    const seen = apartNow() || (piecesSeen() && state.cuts.some((plane) => plane.limbs_mm)); // a limb's colour is seen on the piece alone
+    picture?.pieces(seen ? pieces : null, pieces ? shiftsOf(pieces, apart) : [], part);
   });
-}
-
-/** What the joint of the chosen part bears, else the weakest of all. */
-function jointInWords(joints, chosen) {
-  const joint = joints.find(({ part }) => part === chosen) || joints.find(({ weakest }) => weakest);
-  if (!joint) return "";
-  const force = `breaks at about ${newtons(joint.load_n)}, pushed sideways ${joint.arm_mm.toFixed(0)} mm away, or pulled off at ${newtons(joint.tension_n)}`;
-  return `The joint of part ${joint.part}${joint.weakest ? ", the weakest," : ""} has ${mm2(joint.area_mm2)}, a seam of ${joint.seam_mm.toFixed(0)} mm and ${force}.`;
 }

@@ -1,6 +1,6 @@
 // Planes: those that are looked at, as the bench has them or a hand holds one: their panel, the knobs in the picture, and what a refused one is in the way of.
 
-import { $, alike, disable, hide, listen, numberIn, onData, putAt, tell } from "../../../../view/template/elements.js";
+import { $, alike, disable, hide, listen, numberIn, onData, pressed, putAt, tell } from "../../../../view/template/elements.js";
 import { add, clamp, cross, dot, length, RAD, rotated, scaled, sub, turned, unit } from "../../../../view/template/picture/math.js";
 import { beside, boxesOf, chained, circle, headOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { RED } from "../../../../view/template/picture/solids.js";
@@ -41,9 +41,8 @@ export const choosePart = (part) => update({ part: part <= store.state.parts ? p
 /** The part at a place of the platform's frame. */
 export const partAt = (place) => planesNow().reduce((part, plane, k) => (dot(plane.normal, place) > plane.offset_mm ? k + 2 : part), 1);
 
-/** A hand that has taken the chosen part's plane: plane, where that stands; wanted, where the hand has it; allowed, the last place that a
- * trial has nothing against, and checked, where the other parts were looked at as well, each with its figures; why: the trial that
- * forbids what is wanted, null: none. */
+/** A hand that has taken the chosen part's plane: plane, where that stands; wanted, where the hand has it; allowed, the last place that a trial has nothing against,
+ * and checked, where the other parts were looked at as well, each with its figures; why: the trial that forbids what is wanted, null: none. */
 function handNow() {
   if (store.hand) return store.hand;
   const here = { plane: planeNow(), figures: figuresNow() };
@@ -122,20 +121,29 @@ const REACH = 1.12; // of a section's radius at which the knobs of the tilt stan
 const STEP_MM = 0.5, STEP_DEG = 1;
 const KNOBS = [{ id: "hand-along", tilts: null }, { id: "hand-tilt-a", tilts: 0 }, { id: "hand-tilt-b", tilts: 1 }];
 
-let last = { of: "", triangles: null, section: null }; // of a large model it takes a moment, and most news change nothing of it
+let last = { of: "", section: null }; // of a large model it takes a moment, and most news change nothing of it
 
 /** Middle and reach of what the chosen plane cuts, where planes are looked at; null: nothing. */
 function sectionNow(picture) {
   const plane = store.tab === "parts" && !apartNow() && store.triangles && store.state.model && picture ? planeNow() : null;
   if (!plane) return null;
-  const of = JSON.stringify([plane, planesNow().slice(store.part - 1), picture.matrix()]);
-  if (of !== last.of || store.triangles !== last.triangles) {
-    last = { of, triangles: store.triangles, section: sectionOf(store.triangles, plane, planesNow().slice(store.part - 1), picture.matrix()) };
-  }
+  const later = planesNow().slice(store.part - 1), of = JSON.stringify([plane, later, picture.matrix(), document.documentElement.dataset.shown]);
+  if (of !== last.of) last = { of, section: sectionOf(store.triangles, plane, later, picture.matrix()) };
   return last.section;
 }
 
-/** Three knobs at the chosen plane: one moves it along its normal, two tilt it; by hand, finger or arrow keys. */
+const GAP_PX = 24, RIM_PX = 8; // of the tools: from the knobs, and from the picture's rim
+
+/** The tools of the chosen plane below or above places of the picture, all of them within it; without a place at its lower rim. */
+function putTools(places) {
+  const tools = $("plane-tools"), { clientWidth: width, clientHeight: height } = $("scene"), [wide, high] = [tools.offsetWidth, tools.offsetHeight];
+  const seen = places.filter(Boolean), xs = seen.map(([x]) => x), ys = seen.map(([, y]) => y), below = Math.max(...ys) + GAP_PX;
+  const top = below + high + RIM_PX < height ? below : Math.min(...ys) - GAP_PX - high;
+  const left = seen.length ? (Math.min(...xs) + Math.max(...xs) - wide) / 2 : (width - wide) / 2;
+  putAt(tools, [clamp(left, RIM_PX, width - wide - RIM_PX), clamp(seen.length ? top : height, RIM_PX, height - high - RIM_PX)]);
+}
+
+/** Three knobs at the chosen plane: one moves it along its normal, two tilt it; by hand, finger or arrow keys; and its tools beside them. */
 export function handlesOf(picture) {
   let section = null; // of the chosen plane
   const placeOf = ({ tilts }) => {
@@ -161,19 +169,34 @@ export function handlesOf(picture) {
     drop: leavePlane,
     step: (sign) => holdPlane(moved(taken(knob), sign * stepOf(knob))),
   }));
-  picture.drawn.push(() => {
+  const place = () => {
     $("handles").hidden = !section || !planeNow() || isLocked();
-    if (!$("handles").hidden) for (const knob of KNOBS) putAt($(knob.id), picture.placeOf(placeOf(knob)));
-  });
+    const places = section && planeNow() ? KNOBS.map((knob) => picture.placeOf(placeOf(knob))) : [];
+    if (!$("handles").hidden) KNOBS.forEach(({ id }, k) => putAt($(id), places[k]));
+    if (!$("plane-tools").hidden) putTools(places);
+  };
+  picture.drawn.push(place);
   subscribe(() => {
     const before = section;
     section = sectionNow(picture);
     if (section !== before) picture.plane(section && { ...planeNow(), ...section });
-    if (!section) $("handles").hidden = true;
+    place();
   });
 }
 
 const MOVED_MM = 0.01, MOVED_DEG = 0.05; // less is not told
+const REFUSAL_MS = 6000; // for which it is told after the plane is let go
+let refusal = { part: 0, text: "", until: 0 }; // why a plane could not be moved, the last one
+
+/** Why the chosen plane cannot be where it is wanted, or could not a moment ago; "": it can. */
+function refusalNow({ hand, part, state: { refused, problem } }) {
+  if (hand?.why) {
+    clearTimeout(refusal.until);
+    const text = `Part ${hand.why.refused_part} cannot be cut off there: ${hand.why.refused}.`;
+    refusal = { part, text, until: setTimeout(() => { refusal.text = ""; update({}); }, REFUSAL_MS) };
+  } else if (hand || part !== refusal.part) refusal.text = "";
+  return refusal.text || (refused ? problem : "");
+}
 
 /** The chosen part's plane: numbers, snaps, and what order it is printed in; new planes, and what becomes of those in a hand. */
 export function planesPanel(picture) {
@@ -199,11 +222,9 @@ export function planesPanel(picture) {
   const tellPlane = () => tellAll(alike(moved.cuts, store.state.cuts) ? moved.text : "");
   const leanAsTyped = () => lean(numberIn("plane-tilt"), numberIn("plane-towards"));
   byPlane("click", {
-    remove: removePart, neck: (part) => send({ do: "neck", part }), "all-above": () => cutLimb(null), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1),
+    remove: removePart, lock: (part) => lockPart(part, !isLocked()), neck: (part) => send({ do: "neck", part }), "all-above": () => cutLimb(null), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1),
   });
-  byPlane("change", {
-    "plane-offset": () => putPlane({ ...planeNow(), offset_mm: numberIn("plane-offset") }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped,
-  });
+  byPlane("change", { "plane-offset": () => putPlane({ ...planeNow(), offset_mm: numberIn("plane-offset") }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped });
   onData("tilt", ({ tilt }) => { if (planeNow()) lean(Number(tilt), numberIn("plane-towards")); });
   listen("click", {
     "find-others": () => send({ do: "search", ranker: $("ranker").value }), add: () => near(newPlane(picture)), "put-near": () => near(store.state.refused.near),
@@ -231,21 +252,23 @@ function movedInWords({ normal, offset_mm: wanted }, there) {
 }
 
 function tellAll(moved) {
-  const { state: { locked, search, cuts }, hand, part } = store, plane = planeNow(), figures = figuresNow(), why = hand?.why;
+  const { state: { locked, search, cuts }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store);
   disable({ "find-others": Boolean(search) || !locked.some(Boolean) });
-  hide({ plane: !plane });
+  hide({ plane: !plane, "plane-tools": !plane || tab !== "parts" || Boolean(search) });
   if (plane) {
     const [tilt, towards] = anglesOf(plane.normal);
     Object.entries({ offset: plane.offset_mm.toFixed(2), tilt: tilt.toFixed(1), towards: towards.toFixed(1) }).forEach(([name, value]) => fill($(`plane-${name}`), value));
-    document.querySelectorAll("#plane input, #plane button").forEach((control) => { control.disabled = isLocked(); });
+    document.querySelectorAll(":is(#plane, #plane-tools) :is(input, button:not(#lock))").forEach((control) => { control.disabled = isLocked(); });
+    $("lock").className = isLocked() ? "icon-locked" : "icon-unlocked";
+    pressed("lock", isLocked());
     hide({ limb: Boolean(plane.limbs_mm), "all-above": !plane.limbs_mm });
     $("earlier").disabled ||= part === 2;
     $("later").disabled ||= part === cuts.length + 1;
   }
   $("plane-told").classList.toggle("refused", Boolean(why));
-  const told = why ? `Part ${why.refused_part} cannot be cut off there: ${why.refused}.` : !figures || !cuts.length ? ""
+  const told = why ? why : !figures || !cuts.length ? ""
     : `${mm2(figures.support_area_mm2)} to support, ${figures.seam_mm.toFixed(0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
-  tell({ "plane-told": told, "plane-moved": moved });
+  tell({ "plane-told": told, "plane-moved": moved, "plane-name": `Part ${part}` });
 }
 
 const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marked

@@ -23,26 +23,14 @@ function entriesOf({ lacking, sliced, compared, given }) {
 }
 
 export function saveMenu() {
-  const button = $("save"), menu = $("save-menu");
-  const show = (whether) => {
-    menu.hidden = !whether;
-    button.setAttribute("aria-expanded", whether);
-    if (whether) menu.querySelector("button:not(:disabled)")?.focus();
-  };
-  const close = () => { if (!menu.hidden) { show(false); button.focus(); } };
   const confirm = () => {
     const { errors } = store.state.sliced;
     tell({ "errors-title": `The dry run found ${errors.length} error${errors.length === 1 ? "" : "s"}` });
     listIn("errors-list", errors.slice(0, 3));
     $("save-anyway").showModal();
   };
-  menu.addEventListener("keydown", (event) => { if (event.key === "Escape") { event.stopPropagation(); close(); } });
-  addEventListener("pointerdown", (event) => { if (!menu.hidden && !menu.contains(event.target) && event.target !== button) show(false); });
-  onData("save", ({ save: address }) => { close(); save(address); });
-  listen("click", {
-    save: () => show(menu.hidden), "save-gcode": () => { close(); if (store.state.sliced.errors.length) confirm(); else save("print.gcode"); },
-    "save-errors": () => save("print.gcode?force=yes"),
-  });
+  onData("save", ({ save: address }) => save(address));
+  listen("click", { "save-gcode": () => (store.state.sliced.errors.length ? confirm() : save("print.gcode")), "save-errors": () => save("print.gcode?force=yes") });
   onNew(entriesOf, (entries) => Object.entries(entries).forEach(([name, [why, words]]) => {
     disable({ [`save-${name}`]: Boolean(why) });
     $(`save-${name}`).querySelector("small").textContent = why || words;

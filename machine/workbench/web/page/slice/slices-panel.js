@@ -9,8 +9,7 @@ import { onNew, onState, store, subscribe, update } from "../store.js";
 
 export function slicesPanel(showFinding) {
   listen("click", {
-    again: () => { update({ looking: false }); $("tab-slices").click(); send({ do: "slice" }); },
-    look: () => update({ looking: !store.looking }), "leave-print": () => { update({ looking: false }); $("look").focus(); },
+    again: () => $("slice").click(), look: () => update({ looking: !store.looking }), "leave-print": () => { update({ looking: false }); $("look").focus(); },
   });
   onState(({ slicing, sliced, colours }) => {
     disable({ slice: Boolean(slicing) });

@@ -1,0 +1,139 @@
+"""The look of the workbench's page: sizes, next steps, cards, the tools at a plane, menus and keys, in a real browser."""
+
+import pytest
+
+from mdp.save import stl
+from tests.machine.browser import CHROMIUM, Browser
+from tests.machine.running_workbench import Running
+from tests.machine.test_workbench_page import IDLE, drag_slider, open_model
+from tests.shapes import box, tee
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
+
+TABS = ("model", "parts", "slices", "printing", "settings")
+# Texts that are seen and smaller than 12 px.
+TINY = """(() => { const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), small = [];
+  for (let text = texts.nextNode(); text; text = texts.nextNode()) {
+    const within = text.parentElement, size = parseFloat(getComputedStyle(within).fontSize);
+    if (text.data.trim() && within.checkVisibility() && size < 12) small.push(within.id || within.className || within.tagName);
+  }
+  return small; })()"""
+# Buttons in the colour of the next step.
+MAIN = """[...document.querySelectorAll('#panel button')].filter((one) => one.checkVisibility() &&
+  getComputedStyle(one).backgroundColor === getComputedStyle($('open')).backgroundColor).map((one) => one.id)"""
+# How far the tools stand out of the picture, px.
+OUTSIDE = """(() => { const [a, b] = ['plane-tools', 'scene'].map((id) => $(id).getBoundingClientRect());
+  return Math.max(b.left - a.left, b.top - a.top, a.right - b.right, a.bottom - b.bottom); })()"""
+UNDO = "$('undo').getAttribute('aria-label')"
+SMALL = (900, 560)
+
+
+def with_plane(browser: Browser, bench: Running) -> None:
+    """A T with a level plane half way up, which is chosen."""
+    open_model(browser, bench, "tee.stl", stl(tee()))
+    browser.click("#tab-parts")
+    browser.click("#add")
+    browser.wait("$('plane-tools').checkVisibility() && $('plane-told').textContent")
+
+
+def control(browser: Browser, key: str) -> None:
+    """A key pressed with Ctrl held."""
+    browser.value(f"document.body.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}', ctrlKey: true, bubbles: true }}))")
+
+
+def test_where_nothing_lies_a_card_opens_a_demo_by_its_picture(browser: Browser, bench: Running) -> None:
+    browser.open(bench.address)
+    browser.wait(f"document.documentElement.dataset.version && {IDLE}")
+    assert browser.value("$('drop').checkVisibility()")
+    assert browser.value("[...$('demos').querySelectorAll('img')].map((one) => one.naturalWidth)") == [136] * 4
+    browser.value(
+        "{ window.asked = 0; $('file').addEventListener('click', (event) => { event.preventDefault(); asked += 1; }); }"
+    )
+    browser.click("#open")
+    control(browser, "o")
+    assert browser.value("asked") == 2
+    browser.click("[data-demo='demo:bracket']")
+    browser.wait("$('title').textContent === 'demo:bracket' && !$('drop').checkVisibility()")
+
+
+@pytest.mark.parametrize("size", [(1280, 800), (720, 900), (390, 844)])
+def test_no_letter_is_small_and_one_button_is_the_next_step(browser: Browser, bench: Running, size: tuple[int, int]) -> None:
+    browser.resize(*size)
+    with_plane(browser, bench)
+    seen = {}
+    for tab in TABS:
+        browser.click(f"#tab-{tab}")
+        browser.wait("new Promise((drawn) => requestAnimationFrame(() => drawn(true)))")
+        assert browser.value(TINY) == []
+        seen[tab] = browser.value(MAIN)
+        assert browser.value("document.documentElement.scrollWidth <= innerWidth")
+    browser.resize(*SMALL)
+    assert seen == {"model": ["slice"], "parts": ["slice"], "slices": ["slice"], "printing": ["check"], "settings": ["slice"]}
+
+
+def test_a_part_has_a_card_that_the_keyboard_chooses_and_locks(browser: Browser, bench: Running) -> None:
+    with_plane(browser, bench)
+    browser.wait("$('parts-list').textContent.includes('breaks at about')")
+    card = browser.value("$('parts-list').children[1].innerText").split("\n")
+    assert card[:2] == ["Part 2", "straight up"]
+    assert card[2:8] == ["volume", "5.00 cm³", "support", "300.0 mm²", "seam", "40 mm"]
+    browser.value("document.querySelector('#parts-list [value=\"2\"]').focus()")
+    browser.value("document.querySelector('#parts-list [value=\"1\"]').click()")  # as an arrow key does
+    assert browser.value("document.activeElement.value") == "1"
+    assert not browser.value("$('plane-tools').checkVisibility()")
+    browser.click("#parts-list [value='2']")
+    browser.value("document.querySelector('.card .lock').focus()")
+    browser.click(".card .lock")
+    browser.wait("$('lock').getAttribute('aria-pressed') === 'true'")
+    assert browser.value("[document.activeElement.name, document.activeElement.checked]") == ["lock-2", True]
+    assert browser.value("$('plane-offset').disabled && $('remove').disabled && !$('lock').disabled")
+    browser.click("#lock")
+    browser.wait("!document.querySelector('.card .lock').checked && !$('remove').disabled")
+
+
+@pytest.mark.parametrize("size", [SMALL, (720, 900), (390, 844)])
+def test_the_tools_stand_in_the_picture_at_the_plane_and_say_why_it_is_refused(
+    browser: Browser, bench: Running, size: tuple[int, int]
+) -> None:
+    browser.resize(*size)
+    with_plane(browser, bench)
+    for view in ("front", "top"):
+        browser.click(f"[data-view={view}]")
+        browser.wait(f"{OUTSIDE} <= 0")
+    drag_slider(browser, "plane-offset", 70, "change")
+    browser.wait("$('plane-told').classList.contains('refused') && $('plane-told').textContent.includes('misses the model')")
+    browser.wait(f"{OUTSIDE} <= 0")
+    browser.resize(*SMALL)
+
+
+def test_the_list_of_steps_goes_back_and_forth_by_several(browser: Browser, bench: Running) -> None:
+    with_plane(browser, bench)
+    drag_slider(browser, "plane-offset", 22, "change")
+    browser.wait(f"{UNDO} === 'undo: move a plane'")
+    browser.click("#history")
+    steps = "[...$('history-menu').children].map((one) => one.textContent)"
+    assert browser.value(f"{steps}.slice(0, 4)") == ["now", "move a plane", "add a plane", "open tee.stl"]
+    browser.click("#history-menu button:nth-child(3)")
+    browser.wait(f"{UNDO} === 'undo: open tee.stl'")
+    assert not browser.value("document.querySelector(':popover-open')")
+    assert browser.value(f"{steps}.slice(0, 3)") == ["move a plane", "add a plane", "now"]
+    browser.click("#history")
+    browser.press(200, 300)
+    assert not browser.value("document.querySelector(':popover-open')")
+    browser.click("#history-menu button:first-child")
+    browser.wait(f"{UNDO} === 'undo: move a plane' && $('redo').disabled")
+
+
+def test_a_key_slices_the_preview_opens_by_itself_and_a_key_saves(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "post.stl", stl(box(8.0, 8.0, 4.0)))
+    browser.click("#tab-model")
+    control(browser, "r")
+    browser.wait("document.body.classList.contains('looking') && !$('print-page').hidden")
+    assert browser.value("$('tab-slices').getAttribute('aria-selected')") == "true"
+    browser.value(
+        "{ const make = URL.createObjectURL; URL.createObjectURL = (one) => { window.saved = one; return make(one); }; }"
+    )
+    control(browser, "g")
+    browser.wait("window.saved")
+    browser.click("#leave-print")
+    assert browser.value(MAIN) == ["verdict-print"]
