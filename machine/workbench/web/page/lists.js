@@ -60,6 +60,3 @@ export function choiceRow(name, value, checked, label, cells, choose) {
   row.onclick = ({ target }) => { if (!["INPUT", "LABEL", "BUTTON"].includes(target.tagName)) choose(); };
   return row;
 }
-
-/** Buttons, one a unit, that say what a model's coordinates are in. */
-export const unitButtons = (row, words, choose) => putNew(row, words, () => words.map((unit) => button(`in ${unit}`, () => choose(unit))));

@@ -1,9 +1,9 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, disable, duration, hide, listen, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
+import { $, button, disable, duration, hide, listen, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
-import { putNew, unitButtons, withWholeOptions } from "./lists.js";
+import { putNew, withWholeOptions } from "./lists.js";
 import { benchesPanel, devicesPanel } from "./model/benches.js";
 import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
 import { facetsOf, modelFetcher, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
@@ -89,7 +89,7 @@ function problemLine() {
   onState(({ problem, refused, units }) => {
     putNew($("problem"), problem, () => withWholeOptions(problem)); // read aloud once
     hide({ problem: !problem, "put-near": !refused?.near });
-    unitButtons($("units"), units?.words || [], (unit) => send({ do: "unit", unit }));
+    putNew($("units"), units?.words || [], () => (units?.words || []).map((unit) => button(`in ${unit}`, () => send({ do: "unit", unit }))));
   });
 }
 

@@ -3,7 +3,7 @@
 import { $, alike, button, hide, listen, numberIn, onData, putAt, sayIn, tell } from "../../../../view/template/elements.js";
 import { add, sub } from "../../../../view/template/picture/math.js";
 import { ask, send } from "../line.js";
-import { fill, listIn, mm2, putNew, tellIn, unitButtons } from "../lists.js";
+import { fill, listIn, mm2, putNew, tellIn } from "../lists.js";
 import { gripOf } from "../scene/grip.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
@@ -34,26 +34,12 @@ export function modelPanel() {
     if (!model) return;
     if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
     listIn("model-notes", model.notes);
-    tellTiny(model);
+    putNew($("remedies"), model.remedies, () => model.remedies.map(({ text, settings }) =>
+      button(text, () => settings.forEach(([key, value]) => send({ do: "set", key, value })))));
     tellFile(model);
     if (area !== null) tell({ overhang: mm2(area), needing: needing === null || mm2(needing) === mm2(area) ? "" : `, of which ${mm2(needing)} need support` });
   });
   subscribe(tellModel);
-}
-
-const TINY_MM = 10, MOST_MM = 2000, UNITS = { inches: 25.4, metres: 1000 }; // a model that is smaller is rarely meant so; the largest that is printed
-const GLTF = /\.(glb|gltf)$/i; // its metres have y up
-
-/** Asks for the unit of a model that is very small. */
-function tellTiny(model) {
-  const most = Math.max(...model.size_mm), known = GLTF.test(model.name) ? ["metres"] : Object.keys(UNITS);
-  const words = known.filter((unit) => most * UNITS[unit] <= MOST_MM);
-  hide({ tiny: most >= TINY_MM || !words.length });
-  tell({ "tiny-told": `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?` });
-  unitButtons($("tiny-units"), words, (unit) => {
-    if (GLTF.test(model.name)) send({ do: "set", key: "process.rotate_deg", value: "[90, 0, 0]" });
-    send({ do: "set", key: "process.scale", value: scaleBy(UNITS[unit]) });
-  });
 }
 
 /** The plates of a slicer file to choose from, and whether it keeps settings. */
