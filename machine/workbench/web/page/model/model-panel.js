@@ -39,7 +39,12 @@ export function modelPanel() {
     tellFile(model);
     if (area !== null) tell({ overhang: mm2(area), needing: needing === null || mm2(needing) === mm2(area) ? "" : `, of which ${mm2(needing)} need support` });
   });
-  subscribe(tellModel);
+  subscribe(({ state: { model, standing } }) => {
+    if (model) tellIn("model-told", [
+      ["name", model.name], ["faces", model.faces.toLocaleString("en")],
+      ["size", `${modelSize({ standing, model }).map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
+    ]);
+  });
 }
 
 /** The plates of a slicer file to choose from, and whether it keeps settings. */
@@ -50,8 +55,6 @@ function tellFile({ plates, has_settings: has, settings_note: note }) {
   hide({ inside: !has });
   sayIn("file-settings-note", note);
 }
-
-const scaleBy = (factor) => String(Number((store.state.scale * factor).toPrecision(9)));
 
 /** A file may be dropped anywhere on the page. */
 function dropping() {
@@ -68,22 +71,15 @@ function dropping() {
 /** Sides along the platform's axes as the model stands, or a hand turns it; as it is read where neither is known. */
 export const modelSize = ({ standing, model }) => ((!store.turning && standing) || store.seen || model).size_mm;
 
-function tellModel({ state: { model, standing } }) {
-  if (model) tellIn("model-told", [
-    ["name", model.name], ["faces", model.faces.toLocaleString("en")],
-    ["size", `${modelSize({ standing, model }).map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
-  ]);
-}
-
 export function sizePanel() {
   const sides = TURNS.map((axis) => $(`size-${axis}`));
   let shown = null; // the standing that was told last
-  const scale = (value) => send({ do: "set", key: "process.scale", value });
-  listen("change", { scale: () => scale(scaleBy(numberIn("scale") / 100 / store.state.scale)) });
+  const scale = (factor) => send({ do: "set", key: "process.scale", value: factor === null ? null : String(Number(factor.toPrecision(9))) });
+  listen("change", { scale: () => scale(numberIn("scale") / 100) });
   listen("click", { "scale-as-read": () => scale(null) });
   sides.forEach((side, k) => side.addEventListener("change", () => {
     const { standing } = store.state;
-    if (standing) scale(scaleBy(Number(side.value) / standing.size_mm[k]));
+    if (standing) scale((store.state.scale * Number(side.value)) / standing.size_mm[k]);
   }));
   onState(({ standing, scale: factor, machine, problem, place_mm: place }, before) => {
     if (!standing) return;
