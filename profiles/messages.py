@@ -36,6 +36,11 @@ def phrase(name: str, terminal: str, value: object = "") -> str:
     return _mark(name, f"{value}", terminal)
 
 
+def settings_in(message: str) -> list[str]:
+    """The settings KEY=VALUE that a message names as options."""
+    return [value for name, value, _ in _MARK.findall(message) if name.endswith("--set")]
+
+
 def terminal_words(message: str) -> str:
     """The message as a terminal shows it."""
     return rendered(message, lambda name, value, terminal: terminal)

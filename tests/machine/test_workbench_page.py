@@ -159,9 +159,17 @@ def test_a_model_of_a_size_that_no_printer_makes_is_asked_for_its_unit_and_opene
     assert browser.value("[...$('units').children].map((button) => button.textContent)") == UNITS
     browser.click("#units button")
     browser.wait("$('title').textContent === 'tiny.stl' && $('scale').value === '100000' && $('size-z').value === '160.00'")
-    assert browser.value("$('problem').hidden && $('tiny').hidden")
+    assert browser.value("$('problem').hidden && !$('remedies').childElementCount")
     browser.click("#undo")
     browser.wait("$('title').textContent === 'tee.stl' && $('scale').value === '100'")
+
+
+def test_a_small_model_has_a_button_that_takes_its_coordinates_as_inches(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "small.stl", stl(Mesh(tee().vertices / 25.4, tee().faces)))
+    assert "its longest side is 1.57 mm: if its coordinates are inches" in browser.value("$('model-notes').textContent")
+    assert browser.value("$('remedies').textContent") == "Set Scale of the model to 25.4"
+    browser.click("#remedies button")
+    browser.wait("$('size-z').value === '40.00' && !$('remedies').childElementCount")
 
 
 def test_a_file_that_is_sent_slowly_is_seen_to_be_under_way_and_may_be_broken_off(browser: Browser, bench: Running) -> None:

@@ -15,6 +15,7 @@ from machine.view.scene import machine_bodies
 from machine.workbench.bench.bench import Bench, Step
 from machine.workbench.bench.changes import Cuts
 from machine.workbench.bench.model import Model
+from machine.workbench.bench.page_words import page_words
 from machine.workbench.session.commands import Need, lacking
 from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session
@@ -25,7 +26,7 @@ from mdp.save import plane_values
 from mdp.search.plan_file import ZONE_KINDS
 from mdp.zone import AnyZone, Brushed, MeshVolume, Modifier, Zone
 from profiles.material import Material
-from profiles.messages import advice, terminal_words
+from profiles.messages import advice, settings_in, terminal_words
 from profiles.profile import Profile
 
 MOST_STEPS_LISTED = 30  # of those that can be undone, or done again
@@ -279,11 +280,18 @@ def _model(model: Model, session: Session) -> dict[str, Any]:
         "size_mm": model.size_mm,
         "volume_mm3": model.volume_mm3,
         "notes": model.notes,
+        "remedies": [_remedy(settings) for note in model.notes if (settings := settings_in(note))],
         "plates": [{"number": number, "name": name, "taken": number == plate} for number, name in model.plates.items()],
         "has_settings": model.has_settings,
         "settings_note": note if key == model.key else "",
         "drawn": model.faces <= MOST_FACES,
     }
+
+
+def _remedy(settings: Sequence[str]) -> dict[str, Any]:
+    """The button that makes settings which a note proposes, as pairs of key and value."""
+    words = " and ".join(page_words(advice("set", setting)) for setting in settings)
+    return {"text": words[0].upper() + words[1:], "settings": [setting.split("=", 1) for setting in settings]}
 
 
 def _trial(session: Session) -> dict[str, Any] | None:

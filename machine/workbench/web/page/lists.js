@@ -52,6 +52,3 @@ export const putTable = (table, told, head, rows) => putNew(table, told, () => {
   const body = rows(), titles = made("tr", {}, ...head.map((text) => (text ? made("th", { text, scope: "col" }) : made("td"))));
   return body.length ? [...(head.length ? [made("thead", {}, titles)] : []), made("tbody", {}, ...body)] : [];
 });
-
-/** Buttons, one a unit, that say what a model's coordinates are in. */
-export const unitButtons = (row, words, choose) => putNew(row, words, () => words.map((unit) => button(`in ${unit}`, () => choose(unit))));

@@ -3,7 +3,7 @@
 import { $, button, disable, duration, hide, listen, made, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
-import { putNew, unitButtons, withWholeOptions } from "./lists.js";
+import { putNew, withWholeOptions } from "./lists.js";
 import { benchesPanel, devicesPanel } from "./model/benches.js";
 import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
 import { facetsOf, modelFetcher, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
@@ -93,7 +93,7 @@ function problemLine() {
   onState(({ problem, refused, units }) => {
     putNew($("problem"), problem, () => withWholeOptions(problem)); // read aloud once
     hide({ problem: !problem, "put-near": !refused?.near });
-    unitButtons($("units"), units?.words || [], (unit) => send({ do: "unit", unit }));
+    putNew($("units"), units?.words || [], () => (units?.words || []).map((unit) => button(`in ${unit}`, () => send({ do: "unit", unit }))));
   });
 }
 

@@ -40,16 +40,12 @@ export const onState = (listener) => subscribe((now, before) => { if (now.state 
 
 /** now: an object, at first what was kept or usual has; keep(changes) changes it. Where a browser keeps nothing, a reload forgets. */
 export function keptInTab(name, usual) {
-  const key = `${name} ${location.pathname}`;
-  const kept = { now: { ...usual } };
-  try {
-    Object.assign(kept.now, JSON.parse(sessionStorage.getItem(key) || "{}"));
-  } catch { /* nothing is kept here */ }
+  const key = `${name} ${location.pathname}`, kept = { now: { ...usual } };
+  const attempt = (act) => { try { act(); } catch { /* nothing is kept here */ } };
+  attempt(() => Object.assign(kept.now, JSON.parse(sessionStorage.getItem(key) || "{}")));
   kept.keep = (changes) => {
     Object.assign(kept.now, changes);
-    try {
-      sessionStorage.setItem(key, JSON.stringify(kept.now));
-    } catch { /* nothing is kept here */ }
+    attempt(() => sessionStorage.setItem(key, JSON.stringify(kept.now)));
   };
   return kept;
 }

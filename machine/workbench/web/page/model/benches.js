@@ -16,9 +16,8 @@ async function openBench(model = null) {
     page?.close();
     return notice(told.problem, "benches");
   }
-  const address = new URL(`../${told.number}/`, location.href).href;
-  if (page) page.location.replace(address);
-  else {
+  page?.location.replace(new URL(`../${told.number}/`, location.href).href);
+  if (!page) {
     notice("The browser opens no further page by itself: the new bench is in the list.", "benches");
     setTimeout(() => notice("", "benches"), TOLD_MS);
   }

@@ -3,7 +3,7 @@
 import { $, alike, button, hide, listen, numberIn, onData, putAt, sayIn, tell } from "../../../../view/template/elements.js";
 import { add, sub } from "../../../../view/template/picture/math.js";
 import { ask, send } from "../line.js";
-import { fill, listIn, mm2, putNew, tellIn, unitButtons } from "../lists.js";
+import { fill, listIn, mm2, putNew, tellIn } from "../lists.js";
 import { gripOf } from "../scene/grip.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
@@ -34,25 +34,16 @@ export function modelPanel() {
     if (!model) return;
     if ($("demo").value !== model.name) $("demo").value = model.name.startsWith("demo:") ? model.name : "";
     listIn("model-notes", model.notes);
-    tellTiny(model);
+    putNew($("remedies"), model.remedies, () => model.remedies.map(({ text, settings }) =>
+      button(text, () => settings.forEach(([key, value]) => send({ do: "set", key, value })))));
     tellFile(model);
     if (area !== null) tell({ overhang: mm2(area), needing: needing === null || mm2(needing) === mm2(area) ? "" : `, of which ${mm2(needing)} need support` });
   });
-  subscribe(tellModel);
-}
-
-const TINY_MM = 10, MOST_MM = 2000, UNITS = { inches: 25.4, metres: 1000 }; // a model that is smaller is rarely meant so; the largest that is printed
-const GLTF = /\.(glb|gltf)$/i; // its metres have y up
-
-/** Asks for the unit of a model that is very small. */
-function tellTiny(model) {
-  const most = Math.max(...model.size_mm), known = GLTF.test(model.name) ? ["metres"] : Object.keys(UNITS);
-  const words = known.filter((unit) => most * UNITS[unit] <= MOST_MM);
-  hide({ tiny: most >= TINY_MM || !words.length });
-  tell({ "tiny-told": `It is only ${Number(most.toPrecision(2))} mm long: are its coordinates in another unit?` });
-  unitButtons($("tiny-units"), words, (unit) => {
-    if (GLTF.test(model.name)) send({ do: "set", key: "process.rotate_deg", value: "[90, 0, 0]" });
-    send({ do: "set", key: "process.scale", value: scaleBy(UNITS[unit]) });
+  subscribe(({ state: { model, standing } }) => {
+    if (model) tellIn("model-told", [
+      ["name", model.name], ["faces", model.faces.toLocaleString("en")],
+      ["size", `${modelSize({ standing, model }).map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
+    ]);
   });
 }
 
@@ -64,8 +55,6 @@ function tellFile({ plates, has_settings: has, settings_note: note }) {
   hide({ inside: !has });
   sayIn("file-settings-note", note);
 }
-
-const scaleBy = (factor) => String(Number((store.state.scale * factor).toPrecision(9)));
 
 /** A file may be dropped anywhere on the page. */
 function dropping() {
@@ -82,22 +71,15 @@ function dropping() {
 /** Sides along the platform's axes as the model stands, or a hand turns it; as it is read where neither is known. */
 export const modelSize = ({ standing, model }) => ((!store.turning && standing) || store.seen || model).size_mm;
 
-function tellModel({ state: { model, standing } }) {
-  if (model) tellIn("model-told", [
-    ["name", model.name], ["faces", model.faces.toLocaleString("en")],
-    ["size", `${modelSize({ standing, model }).map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
-  ]);
-}
-
 export function sizePanel() {
   const sides = TURNS.map((axis) => $(`size-${axis}`));
   let shown = null; // the standing that was told last
-  const scale = (value) => send({ do: "set", key: "process.scale", value });
-  listen("change", { scale: () => scale(scaleBy(numberIn("scale") / 100 / store.state.scale)) });
+  const scale = (factor) => send({ do: "set", key: "process.scale", value: factor === null ? null : String(Number(factor.toPrecision(9))) });
+  listen("change", { scale: () => scale(numberIn("scale") / 100) });
   listen("click", { "scale-as-read": () => scale(null) });
   sides.forEach((side, k) => side.addEventListener("change", () => {
     const { standing } = store.state;
-    if (standing) scale(scaleBy(Number(side.value) / standing.size_mm[k]));
+    if (standing) scale((store.state.scale * Number(side.value)) / standing.size_mm[k]);
   }));
   onState(({ standing, scale: factor, machine, problem, place_mm: place }, before) => {
     if (!standing) return;

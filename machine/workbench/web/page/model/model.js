@@ -125,18 +125,8 @@ function facetDrawn({ normal, corners }, lit, picture) {
   return { solid: trianglesOf([{ corners: places, colour: COLOUR }]), matrix: picture.matrix(), strength: lit ? LIT : FAINT };
 }
 
-let wanted = []; // [rotation, canvas] of small pictures that are drawn as soon as nothing else is to be done
-
-/** A small picture of the model as it would stand by a rotation; "" without a picture. */
-function thumbnail(picture, rotation) {
-  if (!picture) return "";
-  const into = made("canvas", { width: 112, height: 84, className: "thumbnail" });
-  if (wanted.push([rotation, into]) === 1) setTimeout(() => {
-    if (store.triangles) picture.thumbnails(wanted.filter(([, canvas]) => canvas.isConnected));
-    wanted = [];
-  });
-  return into;
-}
+/** A small picture of the model as it would stand by a rotation, drawn as soon as nothing else is to be done. */
+const thumbnail = (rotation) => made("canvas", { width: 112, height: 84, className: "thumbnail", rotation });
 
 /** The ways in which the model rests, and how a search has laid it down; without a picture in words alone. */
 export function thumbnailsOf(picture) {
@@ -145,11 +135,14 @@ export function thumbnailsOf(picture) {
     const now = JSON.stringify([resting, laid]), drawn = triangles && picture, views = laid && drawn ? [["as it stood", laid.before], ["as it lies now", laid.after]] : [];
     if (now === told && triangles === model) return;
     [told, model] = [now, triangles];
+    const held = $("resting").contains(document.activeElement); // the present one has the keyboard then, as the one that was pressed
     $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area, present }) => {
       const lay = () => { update({ clicks: "" }); send({ do: "stand", rotation }); };
-      return button("", lay, { ariaPressed: String(present) }, thumbnail(drawn, rotation), made("span", { text: words }), made("small", { text: mm2(area) }));
+      return button("", lay, { ariaPressed: String(present) }, drawn ? thumbnail(rotation) : "", made("span", { text: words }), made("small", { text: mm2(area) }));
     }));
+    if (held) $("resting").querySelector("[aria-pressed=true]")?.focus();
     hide({ laid: !views.length });
-    $("laid").replaceChildren(...views.map(([words, rotation]) => made("figure", {}, thumbnail(drawn, rotation), made("figcaption", { text: words }))));
+    $("laid").replaceChildren(...views.map(([words, rotation]) => made("figure", {}, thumbnail(rotation), made("figcaption", { text: words }))));
+    if (drawn) setTimeout(() => { if (store.triangles) picture.thumbnails([...document.querySelectorAll(":is(#resting, #laid) .thumbnail")].map((canvas) => [canvas.rotation, canvas])); });
   });
 }
