@@ -70,7 +70,11 @@ class Part:
 
     def in_part_frame(self) -> Mesh:
         """The part's mesh in the part frame: direction is +z, base plane is z = 0."""
-        return self.mesh.transform(self.rotation, (0.0, 0.0, -self.base.offset_mm))
+        return self.in_frame_of(self)
+
+    def in_frame_of(self, part: "Part") -> Mesh:
+        """The part's mesh in the frame of another part."""
+        return self.mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,16 +10,9 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from profiles.frozen import Effect, Frozen
-from profiles.profile import SECTIONS, Profile
-from profiles.wording import keys
+from profiles.profile import Profile
 
 USUAL = {"process": Effect.PRICES, "material": Effect.PRICES, "machine": Effect.FRONT, "search": Effect.FRONT}
-
-
-def effect_of(key: str) -> Effect:
-    """The effect of a key, given by its dotted name with the section. Raises KeyError for an unknown key."""
-    section = key.partition(".")[0]
-    return _effect(dict(keys(SECTIONS[section], f"{section}."))[key], USUAL[section])
 
 
 def effect_of_change(before: Profile, after: Profile) -> Effect:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from machine.dryrun import clearance, extrusion, heat, interfaces, layering, motion, own_comments, placement, sequence
-from machine.dryrun.findings import Finding
+from machine.dryrun.findings import Finding, errors_of
 from machine.dryrun.interfaces import InterfaceBalance, balance_of
 from machine.dryrun.replay import Contacts, replay
 from machine.dryrun.strokes import Beads, beads_of
@@ -66,14 +66,9 @@ class DryRun:
         return self.program.e_mm[self.deposited.rows] * self.filament_mm2
 
     @property
-    def segment_type(self) -> list[str]:
-        """The ;TYPE: name of each segment."""
-        return [self.program.types[k] for k in self.program.type[self.segment_row]]
-
-    @property
     def errors(self) -> tuple[Finding, ...]:
         """The findings that refuse a print."""
-        return tuple(finding for finding in self.findings if finding.severity == "error")
+        return errors_of(self.findings)
 
 
 def dry_run(lines: Iterable[str], profile: Profile, known: Sequence[Finding] | None = None) -> DryRun:
@@ -193,6 +188,12 @@ def _box(deposited: Beads, counted: NDArray[np.bool_]) -> list[list[float]]:
     return [least.tolist(), most.tolist()]
 
 
+def reached(run: DryRun) -> dict[str, list[float]]:
+    """The least and the greatest value of each axis, mm or deg, by its letter; [] where nothing moves."""
+    program = run.program
+    return {letter: program.bounds[:, k].tolist() if len(program.end) else [] for k, letter in enumerate(run.letters)}
+
+
 def summary(run: DryRun) -> dict[str, Any]:
     """The figures of `simulate --json` and `export --json`."""
     program = run.program
@@ -208,7 +209,7 @@ def summary(run: DryRun) -> dict[str, Any]:
         "reorientations": int((program.kind == MoveKind.ROTATE).sum()),
         "retractions": retractions(program),
         "bounds_mm": box,
-        "axes": {letter: program.bounds[:, k].tolist() if len(program.end) else [] for k, letter in enumerate(run.letters)},
+        "axes": reached(run),
         "interfaces": [
             {
                 "part": face.part,

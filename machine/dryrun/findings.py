@@ -28,6 +28,11 @@ class Finding:
     message: str
 
 
+def errors_of(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Those findings for which a print is refused."""
+    return tuple(finding for finding in findings if finding.severity == "error")
+
+
 @dataclass(frozen=True)
 class KnownFindings:
     """The findings of a dry run, with a digest of its lines and its profile."""

@@ -33,6 +33,7 @@ REACH_MM = 2.0  # from the plane of the tip, of plastic that can matter
 NOTHING = -1e9
 ROUNDING_MM = 1e-6
 MOST_COLUMNS = 4_000_000
+MARGIN_MM = 1.5
 
 Mask = NDArray[np.bool_]
 
@@ -217,9 +218,9 @@ def _outer_loops(bars: Bars, program: ParsedProgram, rows: Indices) -> Floats:
     return np.concatenate(sides) if sides else np.zeros((0, 4))
 
 
-def lattice_over(points: Floats, cell_mm: float, margin_mm: float = 1.5) -> Lattice:
+def lattice_over(points: Floats, cell_mm: float) -> Lattice:
     """A lattice over (n, 2) points and a margin; its columns grow to limit their number."""
-    low, high = points.min(axis=0) - margin_mm, points.max(axis=0) + margin_mm
+    low, high = points.min(axis=0) - MARGIN_MM, points.max(axis=0) + MARGIN_MM
     cell = max(cell_mm, float(np.sqrt((high - low).prod() / MOST_COLUMNS)))
     return Lattice(low, cell, np.ceil((high - low) / cell).astype(np.int64))
 

@@ -140,10 +140,10 @@ class Route:
     seconds: float
 
 
-def poses_between(start: Pose, end: Pose, step_deg: float = STEP_DEG) -> list[Pose]:
-    """Poses from start to end, both included, with both axes in proportion, step_deg apart (more if too many)."""
+def poses_between(start: Pose, end: Pose) -> list[Pose]:
+    """Poses from start to end, both included, both axes in proportion, STEP_DEG apart (farther when they would be too many)."""
     tilt, turn = end.tilt_deg - start.tilt_deg, end.turn_deg - start.turn_deg
-    count = min(max(1, ceil(hypot(tilt, turn) / step_deg)), MOST_STEPS)
+    count = min(max(1, ceil(hypot(tilt, turn) / STEP_DEG)), MOST_STEPS)
     return [Pose(start.tilt_deg + tilt * k / count, start.turn_deg + turn * k / count) for k in range(count + 1)]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from operator import attrgetter
 
-from machine.dryrun.dryrun import summary
+from machine.dryrun.dryrun import reached
 from machine.dryrun.starvation import find_starvation
 from machine.firmware import dialect_of, dialects, firmware_of, identify
 from machine.firmware.klipper import stepper_name
@@ -88,8 +88,8 @@ def program_sentences(identity: Identity, loaded: LoadedProgram, force: bool) ->
         rotary = (machine.tilt.letter, machine.turn.letter)
         # in workpiece coordinates X Y Z are not positions of the axes
         letters = rotary if machine.coordinates == "workpiece" else None
-        reached = {axis: reach for axis, reach in summary(program.run)["axes"].items() if reach}
-        yield exceeded_limit(identity.printer, {axis: reached[axis] for axis in reached if letters is None or axis in letters})
+        moved = {axis: reach for axis, reach in reached(program.run).items() if reach and (letters is None or axis in letters)}
+        yield exceeded_limit(identity.printer, moved)
     lacking = lacking_macros(identity, _block_lines(machine))
     yield _unknown_macros([name for name in lacking_macros(identity, program.lines) if name not in lacking], loaded.name)
     if not force:

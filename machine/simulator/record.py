@@ -42,10 +42,6 @@ class Record:
     underruns: int  # how often the planner ran dry in mid-motion
     slowed: int  # moves slowed down because the host sent too few
 
-    def happened(self, what: str) -> bool:
-        """Whether an event that begins with this text is on record."""
-        return any(text.startswith(what) for _, text in self.events)
-
     def deposited(self, filament_diameter_mm: float = 1.75) -> tuple[Floats, Floats]:
         """Strokes: (n, 2, 3) segments in the workpiece frame and (n,) volumes, mm³, of moves that push filament while moving."""
         pushed = self.end[:, 5] - self.start[:, 5]

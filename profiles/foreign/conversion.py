@@ -144,14 +144,14 @@ def density(line: str) -> Convert:
     return convert
 
 
-def one_of(words: dict[str, str], unknown: str = "has no equivalent here") -> Convert:
+def one_of(words: dict[str, str]) -> Convert:
     """A choice mapped to a choice."""
 
     def convert(config: Config, key: str) -> Converted:
         text = config.text(key) or ""
         found = words.get(text)
         if found is None:
-            return None, unknown
+            return None, "has no equivalent here"
         return found, "" if found == text else "the nearest there is"
 
     return convert

@@ -56,14 +56,9 @@ Pins = Mapping[int, Floats]  # by the part that fills them: (k, 3) x and y of th
 def near_parts(part: Part, others: Sequence[Part], reach_mm: float) -> list[Part]:
     """The parts whose bounding box, in the part's frame, comes within reach_mm of the part's own."""
     low, high = part.in_part_frame().bounds_mm
-    boxes = [in_frame_of(part, neighbour).bounds_mm for neighbour in others]
+    boxes = [neighbour.in_frame_of(part).bounds_mm for neighbour in others]
     near = [bool(np.all((box[0] < high + reach_mm) & (box[1] > low - reach_mm))) for box in boxes]
     return [neighbour for neighbour, is_near in zip(others, near, strict=True) if is_near]
-
-
-def in_frame_of(part: Part, neighbour: Part) -> Mesh:
-    """The mesh of a neighbour in the frame of a part."""
-    return neighbour.mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
 
 
 def frame_change(part: Part, to: Part) -> tuple[Floats, Floats]:
@@ -80,7 +75,7 @@ def base_section(part: Part) -> Polygons:
 
 def sections_of(others: Sequence[Part], part: Part, cuts_mm: Floats) -> list[Polygons]:
     """The united sections of other parts at every height in the part's frame."""
-    layers = [[clean(loops) for loops in cross_sections(in_frame_of(part, neighbour), cuts_mm)] for neighbour in others]
+    layers = [[clean(loops) for loops in cross_sections(neighbour.in_frame_of(part), cuts_mm)] for neighbour in others]
     return [union(layer) for layer in zip(*layers, strict=True)] if layers else [Polygons()] * len(cuts_mm)
 
 
@@ -259,7 +254,7 @@ def _pins_of(part: Part, parts: Sequence[Part], planned: Pins, profile: Profile)
         keep_mm, change = room_around_mm(below.process), frame_change(part, lower)
         looks = ceil((process.pin_depth_mm + keep_mm) / process.layer_height_mm) + 1  # about the number of layers
         depths_mm = -np.linspace(process.pin_depth_mm + keep_mm, BELOW_MM, looks)
-        meshes = [in_frame_of(part, lower), *pin_holes(part, parts, planned, profile)]
+        meshes = [lower.in_frame_of(part), *pin_holes(part, parts, planned, profile)]
         room = offset_round(base_section(part), -keep_mm - 0.5 * wide_mm)
         for solid, *holes in zip(*(cross_sections(mesh, depths_mm) for mesh in meshes), strict=True):
             if room.is_empty():

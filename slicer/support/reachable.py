@@ -22,7 +22,7 @@ from profiles.machine import Machine
 from profiles.process import Process
 from slicer.geometry.polygons import Polygons, half_plane, offset, offset_round, rectangle, union, unite_layers
 from slicer.heights import SAME_MM, Heights
-from slicer.interface.interface import BasePlane, frame_change, in_frame_of, plane_in_frame_of, room_of
+from slicer.interface.interface import BasePlane, frame_change, plane_in_frame_of, room_of
 from slicer.sectioning import Sections
 
 COARSE_MM = 0.03  # tolerance for simplifying sections before they are grown
@@ -269,7 +269,7 @@ def standing_beside(limb: Part, earlier: Sequence[Part], machine: Machine, cell_
     """The columns of earlier parts above a limb's base plane. cell_mm: the grid on which they will be queried."""
     points = [np.zeros((0, 3))]
     for part in earlier:
-        mesh = in_frame_of(limb, part)
+        mesh = part.in_frame_of(limb)
         corners = mesh.vertices[mesh.faces]
         corners = subdivide(np.ascontiguousarray(corners[corners[:, :, 2].max(axis=1) > 0.0]), 2.0 * cell_mm)
         points.append(corners.reshape(-1, 3))

@@ -5,6 +5,7 @@ from functools import cache
 import manifold3d as m3
 import numpy as np
 
+from machine.dryrun.dryrun import DryRun
 from machine.gcode.writer import write_gcode
 from machine.planning.moves import MachineProgram
 from machine.planning.plan import plan
@@ -79,3 +80,8 @@ def whole(machine: str = "generic_ac") -> tuple[Profile, tuple[str, ...]]:
     decomposition = post_and_arm(profile.machine)
     sliced = [squares(piece, profile, layers) for piece, layers in zip(decomposition.parts, (300, 5), strict=True)]
     return profile, tuple(write_gcode(plan(decomposition, sliced, profile), profile))
+
+
+def segment_types(run: DryRun) -> list[str]:
+    """The type of each deposited segment of a dry run."""
+    return [run.program.types[k] for k in run.program.type[run.segment_row]]

@@ -20,6 +20,7 @@ import serial.rfc2217
 from machine.link import identification
 from machine.link.port import Port
 from machine.simulator.firmware import SimulatedFirmware
+from machine.simulator.record import Record
 
 RATES = {getattr(termios, f"B{rate}"): rate for rate in (9600, 57600, 115200, 230400, 1000000)}
 Answer = Callable[[bytes, int], bytes]  # what is received, baud rate that the host has set -> what is answered
@@ -198,3 +199,8 @@ def hear_out(monkeypatch: pytest.MonkeyPatch, asker: ModuleType, *mute: str) -> 
         return asked(Ear(port), baud, 0.1 if port.name in mute else PATIENCE_S, over)  # type: ignore[arg-type]
 
     monkeypatch.setattr(asker, "ask_at_any_rate", patiently)
+
+
+def happened(record: Record, what: str) -> bool:
+    """Whether an event that begins so is on a simulated printer's record."""
+    return any(text.startswith(what) for _, text in record.events)

@@ -30,6 +30,7 @@ from machine.workbench.printing.at_page import AtPage, HandCommand, HandDoes
 from mdp.pose import Pose
 from profiles.errors import FirmwareError, MoveError, PortError, PrinterError
 from profiles.profile import load
+from tests.machine.peers import happened
 from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 # Fast axes make a run short; the printer of every run is another one.
@@ -147,7 +148,7 @@ def targets_c(printer: VirtualPrinter) -> tuple[float, float]:
 def test_an_error_at_any_step_leaves_the_heaters_off(loop: Loop, monkeypatch: MonkeyPatch) -> None:
     whole, printer = Steps(), VirtualPrinter(PROFILE.machine)
     loop(whole, printer, monkeypatch)
-    assert printer.record.happened("nozzle 2")
+    assert happened(printer.record, "nozzle 2")
     assert targets_c(printer) == (0.0, 0.0)
     hot = []
     for step in range(1, whole.count + 1):
@@ -193,7 +194,7 @@ def test_a_start_block_that_cannot_be_filled_in_is_told_and_nothing_moves(monkey
     ended = in_hand(steps, printer, monkeypatch, HEAT, HOME, HandCommand(HandDoes.LET_GO))
     assert "{warmth}" in steps.last["status"].message
     assert (ended.sentence, targets_c(printer)) == ("let go of; the heaters are off", (0.0, 0.0))
-    assert not printer.record.happened("homed XYZAC")
+    assert not happened(printer.record, "homed XYZAC")
 
 
 @pytest.mark.parametrize("heat", ["M109 S210", "m109s210", "M0109 S210", "M104 I1\nM190 R60", "M141 S40\nM191 S40"])
@@ -204,7 +205,7 @@ def test_homing_by_hand_heats_nothing_and_does_not_wait(heat: str, monkeypatch: 
     printer = VirtualPrinter(PROFILE.machine)
     ended = in_hand(Steps(), printer, monkeypatch, HOME, HandCommand(HandDoes.LET_GO, keep_heat=True))
     assert (ended.sentence, targets_c(printer)) == ("let go of; no heater is on", (0.0, 0.0))
-    assert printer.record.happened("homed XYZAC")
+    assert happened(printer.record, "homed XYZAC")
     assert printer.record.unknown == 0
 
 
@@ -235,7 +236,7 @@ def test_an_emergency_stop_counts_while_the_heaters_are_switched_off() -> None:
     session.order(StopError)
     with pytest.raises(FirmwareError, match="emergency stop: the printer has halted"), session:
         pass
-    assert printer.record.happened("M112")
+    assert happened(printer.record, "M112")
 
 
 def test_who_leaves_twice_ends_a_session_once() -> None:
@@ -258,7 +259,7 @@ def test_measuring_does_not_begin_at_heaters_that_the_printer_does_not_confirm_t
     session.command("M104 S200")
     with pytest.raises(PrinterError, match="did not confirm that its heaters are off: measuring is done cold"):
         begin_cold(session, PrinterMover(session, calibration_pen(PROFILE)), PROFILE.machine)
-    assert not printer.record.happened("homed XYZAC")
+    assert not happened(printer.record, "homed XYZAC")
 
 
 def session_at(printer: VirtualPrinter) -> CommandSession:

@@ -7,9 +7,10 @@ import pytest
 
 from machine.pipeline.choice import pricing
 from mdp.search.search import decompose
-from profiles.effect import effect_of, effect_of_change
+from profiles.effect import USUAL, effect_of_change
 from profiles.frozen import Effect, Frozen
-from profiles.profile import Profile, load
+from profiles.profile import SECTIONS, Profile, load
+from profiles.wording import keys
 from tests.shapes import tee
 
 QUICK = ("search.directions=40", "search.beam_width=2", "process.layer_height_mm=0.4", "process.line_width_mm=0.8")
@@ -59,6 +60,13 @@ def _sample(profile: Profile, owner: str, key: str) -> object:
     for step in (*owner.rstrip(".").split("."), key):
         value = getattr(value, step)
     return value
+
+
+def effect_of(key: str) -> Effect:
+    """The effect that a key declares, or the usual one of its section."""
+    section = key.partition(".")[0]
+    declared = dict(keys(SECTIONS[section], f"{section}."))[key].json_schema_extra
+    return Effect(declared["effect"]) if isinstance(declared, dict) and "effect" in declared else USUAL[section]
 
 
 @pytest.mark.parametrize("settings", VARIANTS)

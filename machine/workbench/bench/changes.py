@@ -6,7 +6,7 @@ Each takes a bench with a model and the page's arguments, and raises PlanError i
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import hypot, radians
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field
@@ -15,7 +15,7 @@ from machine.pipeline.requests import MOST_COPIES
 from machine.planning.stops import check_stop_heights, parse_stops
 from machine.workbench.bench.bench import Bench, laid_down, with_cuts, with_rotation
 from machine.workbench.bench.part_settings import with_part_setting, without_part_settings
-from machine.workbench.bench.values import Direction, Mm, Point, Rotation, check_number
+from machine.workbench.bench.values import Direction, Mm, Point, Rotation, check_number, with_value
 from mdp.directions.orientation import set_on_plate
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask
@@ -227,7 +227,7 @@ def mark(
     index = len(zones) if number is None else check_number("number", number, 1, len(zones)) - 1
     if index >= MOST_ZONES:
         raise PlanError(f"there are {index} zones of {kind}: {MOST_ZONES} are allowed")
-    return _with(bench.zones, kind, (*zones[:index], zone, *zones[index + 1 :]))
+    return with_value(bench.zones, kind, (*zones[:index], zone, *zones[index + 1 :]))
 
 
 def _box(min_mm: Point | None, max_mm: Point | None, axes: Rotation | None) -> Zone:
@@ -284,12 +284,7 @@ def unmark(bench: Bench, *, kind: Kind, number: int) -> Zones:
     """Remove the zone `number` of a kind. Raises PlanError."""
     zones: tuple[AnyZone, ...] = getattr(bench.zones, kind)
     index = check_number("number", number, 1, len(zones)) - 1
-    return _with(bench.zones, kind, (*zones[:index], *zones[index + 1 :]))
-
-
-def _with(zones: Zones, kind: str, several: tuple[AnyZone, ...]) -> Zones:
-    changed: dict[str, Any] = {kind: several}
-    return replace(zones, **changed)
+    return with_value(bench.zones, kind, (*zones[:index], *zones[index + 1 :]))
 
 
 def workpiece_mesh(bench: Bench) -> Mesh:

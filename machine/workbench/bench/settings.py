@@ -14,6 +14,7 @@ from machine.pipeline.output import plain_name
 from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import Bench
 from machine.workbench.bench.part_settings import option, own_values
+from machine.workbench.bench.values import with_value
 from mdp.pose import turned_further
 from profiles.errors import ProfileError
 from profiles.frozen import TITLES, Frozen, may_be_left_out, unit_of
@@ -80,13 +81,7 @@ def with_name(given: Given, kind: str, name: str) -> Given:
     """Choose another machine, material or process. Raises ProfileError for an unknown one."""
     if name not in known(kind):
         raise ProfileError(f"{name!r} is no {kind}: {', '.join(known(kind))} are known")
-    return named(given, kind, name)
-
-
-def named(given: Given, kind: str, name: str) -> Given:
-    """Choose another machine, material or process, by name or file."""
-    change: dict[str, Any] = {kind: name}
-    return replace(given, **change)
+    return with_value(given, kind, name)
 
 
 def profile_as_given(given: Given, before: Profile) -> Profile:

@@ -1,8 +1,9 @@
 """Types of the arguments of page commands; invalid values are refused in sentences like those of profiles."""
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from inspect import Parameter, signature
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 import numpy as np
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field, ValidationError, create_model
@@ -12,6 +13,10 @@ from profiles.errors import PlanError
 from profiles.frozen import Vector
 from profiles.wording import sentences
 
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+Whole = TypeVar("Whole", bound="DataclassInstance")
 Asked = dict[str, Any]  # a command `{"do": NAME, ...}` from a page
 MOST_MM = 1e5
 ROTATION_ERROR = 1e-6
@@ -72,6 +77,12 @@ def check_number(key: str, value: int, least: int, most: int) -> int:
         allowed = f"{least} to {most} is allowed" if least <= most else "there is none yet"
         raise PlanError(f"{key} is {value}: {allowed}")
     return value
+
+
+def with_value(whole: Whole, name: str, value: object) -> Whole:
+    """The same dataclass with another value of one field, named at run time."""
+    change: dict[str, Any] = {name: value}
+    return replace(whole, **change)
 
 
 def vector_of(values: Iterable[float]) -> Vector:

@@ -65,7 +65,8 @@ def search(session: Session, *, orient: bool = True, ranker: str = CLASSIC) -> N
     session.finding.search(orient, ranker.strip() or CLASSIC)
 
 
-def slice_bench(session: Session) -> None:
+def begin_slices(session: Session) -> None:
+    """Begin to slice what lies on the bench."""
     session.slicing.slice()
 
 
@@ -109,7 +110,7 @@ ACTS: dict[str, Callable[..., Any]] = {
     "redo": redo,
     "dismiss": dismiss,
     "search": search,
-    "slice": slice_bench,
+    "slice": begin_slices,
     "compare": compare,
     "stop": Session.stop,
     "try": try_plane,

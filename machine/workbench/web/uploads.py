@@ -16,7 +16,7 @@ from starlette.responses import JSONResponse, Response
 from machine.pipeline.project import Project, is_project, read_folder
 from machine.pipeline.requests import GCODE_SUFFIXES, Given
 from machine.workbench.access.limits import DEVICE, check_model_name, check_plan, check_profile
-from machine.workbench.bench.settings import named
+from machine.workbench.bench.values import with_value
 from machine.workbench.session.keeping import OPEN_ELSEWHERE
 from machine.workbench.session.session import Session
 from machine.workbench.work.folders import Received, folders_kept, remove_file
@@ -41,7 +41,7 @@ class Uploads:
         for kind in KINDS:
             file = Path(getattr(given, kind))
             if file.parent.parent == self._profiles.path:
-                given = named(given, kind, file.name)
+                given = with_value(given, kind, file.name)
         return given
 
     async def take(self, session: Session, request: Request) -> Response:
@@ -131,7 +131,7 @@ class Uploads:
         """The project with copies of its profile files, which benches may share. Raises OSError."""
         given = project.given
         for kind, name in project.own_names.items():
-            given = named(given, kind, str(shutil.copy(getattr(given, kind), self._profiles.new_file(name))))
+            given = with_value(given, kind, str(shutil.copy(getattr(given, kind), self._profiles.new_file(name))))
         return replace(project, given=given)
 
     async def _take_profile(self, path: Path, session: Session) -> bool:
@@ -142,7 +142,7 @@ class Uploads:
             return False
         copy = str(shutil.copy(path, self._profiles.new_file(path.name)))
         try:
-            await session.take_given(f"take {path.name}", lambda given: named(given, kind, copy))
+            await session.take_given(f"take {path.name}", lambda given: with_value(given, kind, copy))
         except ProfileError as error:
             remove_file(Path(copy))
             raise ProfileError(f"{error}".replace(f"{Path(copy).parent}{os.sep}", "")) from None

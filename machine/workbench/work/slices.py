@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from machine.dryrun.dryrun import summary
-from machine.dryrun.findings import Finding, KnownFindings, known_findings
+from machine.dryrun.findings import Finding, KnownFindings, errors_of, known_findings
 from machine.pipeline.choice import as_turned
 from machine.pipeline.comparison import in_one_part, in_parts
 from machine.pipeline.pipeline import build
@@ -93,7 +93,7 @@ class Sliced:
     @property
     def errors(self) -> tuple[Finding, ...]:
         """Findings of severity error, because of which the command line refuses to write or print without --force."""
-        return tuple(finding for finding in self.findings if finding.severity == "error")
+        return errors_of(self.findings)
 
 
 def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:

@@ -16,6 +16,7 @@ from machine.printing.serial_log import tap
 from machine.simulator.faults import Fault, FaultScript
 from profiles.errors import FirmwareError, PortError, PrinterError
 from profiles.profile import Profile, load
+from tests.machine.peers import happened
 from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
@@ -200,7 +201,7 @@ def test_the_emergency_stop_is_the_next_thing_on_the_wire_and_no_line_follows() 
     assert watcher.shown[-1].heat_is_old
     assert not watcher.shown[-2].heat_is_old
     assert written[-1] == b"\nM112\n"
-    assert watcher.printer.record.happened("M112")
+    assert happened(watcher.printer.record, "M112")
 
 
 def test_an_emergency_stop_without_answer_is_given_twice_and_says_to_cut_the_power() -> None:

@@ -31,7 +31,7 @@ from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import FirmwareError, JournalError, SilenceError
 from profiles.profile import Profile, load
-from tests.machine.peers import on_terminal
+from tests.machine.peers import happened, on_terminal
 from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
@@ -628,7 +628,7 @@ def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that
     with SimulatedPrinter(PROFILE.machine) as printer:
         assert main(["resume", str(journal.path), "--port", printer.path, "--machine", "gen5x"]) == 1
         assert main(["resume", str(journal.path), "--port", printer.path]) == 1
-        assert not printer.record.happened("nozzle")
+        assert not happened(printer.record, "nozzle")
     with journal_of(text, "done") as journal:
         journal.write(Checkpoint(120, 120, 100, 20, state=PrintState.DONE))
     assert main(["resume", str(journal.path), "--port", "x"]) == 1

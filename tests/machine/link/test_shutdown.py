@@ -18,6 +18,7 @@ from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import FirmwareError, SilenceError
 from profiles.profile import load
+from tests.machine.peers import happened
 from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 SLOW = load(settings=["machine.z.speed_mm_s=2"])
@@ -70,7 +71,7 @@ def test_an_emergency_stop_is_heeded_while_homing_is_waited_for() -> None:
 
     with pytest.raises(FirmwareError, match="emergency stop: the printer has halted; switch it off and on, or press its reset"):
         print_lines(HOMING, PATH, control=control, medium=watching(printer.medium, b"G28 X Y Z", press), profile=SLOW)
-    assert not printer.record.happened("homed XYZ")
+    assert not happened(printer.record, "homed XYZ")
 
 
 def test_an_emergency_stop_is_heeded_while_the_tip_is_lifted() -> None:

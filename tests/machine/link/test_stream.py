@@ -25,7 +25,7 @@ from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import FirmwareError, LocalProtocolError, PortError, PrinterError, SilenceError
 from profiles.profile import load
-from tests.machine.peers import PATIENCE_S
+from tests.machine.peers import PATIENCE_S, happened
 from tests.machine.virtual_printer import HEALED, PATH, VirtualPrinter, random_script
 
 MACHINE = load().machine
@@ -201,8 +201,8 @@ def test_stopping_leaves_heaters_off_and_moves_nothing_home(lines: list[str]) ->
     assert outcome.cancelled
     assert outcome.heaters_off
     assert (record.nozzle_target_c, record.bed_target_c, record.fan) == (0.0, 0.0, 0.0)
-    assert record.happened("M410")
-    assert not record.happened("homed")
+    assert happened(record, "M410")
+    assert not happened(record, "homed")
 
 
 def test_without_an_emergency_parser_stopping_still_switches_the_heaters_off() -> None:
@@ -222,7 +222,7 @@ def test_ctrl_c_leaves_heaters_off_and_is_passed_on() -> None:
         with pytest.raises(KeyboardInterrupt):
             print_lines(["M302 P1", "M104 S200", *strokes(3000)], printer.path, 250000, on_progress=press, medium=PATIENT)
         assert printer.record.nozzle_target_c == 0.0
-        assert printer.record.happened("nozzle 200")
+        assert happened(printer.record, "nozzle 200")
 
 
 def test_an_error_of_the_callers_own_code_leaves_heaters_off() -> None:

@@ -18,6 +18,7 @@ from mdp.search.search import SearchRequest, cut_by_plan
 from mdp.zone import Marked, Zone
 from profiles.errors import MoveError, PlanError
 from profiles.profile import Profile, load
+from tests.machine.hand import segment_types
 from tests.shapes import box, tee
 from tests.slicer.hand import whole
 
@@ -43,7 +44,7 @@ def printed(x: float, y: float) -> Program:
 
 def printed_middle(x: float, y: float) -> np.ndarray:
     run = printed(x, y).run
-    own = [name not in ("Custom", "Skirt/Brim") for name in run.segment_type]
+    own = [name not in ("Custom", "Skirt/Brim") for name in segment_types(run)]
     ends = run.deposited.segments(own).reshape(-1, 3)
     middle: np.ndarray = 0.5 * (ends.min(axis=0) + ends.max(axis=0))[:2]
     return middle

@@ -29,6 +29,7 @@ from profiles.profile import Profile, load, with_part_settings
 from slicer.geometry.polygons import of_contours
 from slicer.modifiers import modified_places
 from slicer.sectioning import marked_areas
+from tests.machine.hand import segment_types
 from tests.shapes import box, standing, tee
 from tests.slicer.hand import cut, whole
 
@@ -102,7 +103,7 @@ def test_every_copy_is_printed_and_a_layer_of_all_comes_before_the_next() -> Non
 
 
 def _own(run) -> np.ndarray:  # type: ignore[no-untyped-def]
-    return np.array([name not in ("Custom", "Skirt/Brim") for name in run.segment_type])
+    return np.array([name not in ("Custom", "Skirt/Brim") for name in segment_types(run)])
 
 
 def test_marks_go_along_with_every_copy() -> None:

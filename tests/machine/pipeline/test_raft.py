@@ -25,6 +25,7 @@ from profiles.profile import Profile, load
 from slicer.estimate.estimate import estimate
 from slicer.raft import lift_mm
 from tests.machine.dryrun.planted import layers, on, word
+from tests.machine.hand import segment_types
 from tests.shapes import box, standing, tee
 
 RAFT = "process.raft_layers=3"
@@ -52,7 +53,7 @@ def placed(program: Program, part: int) -> np.ndarray:
     """(n, 2, 3) beads of the model in a part, in the workpiece frame."""
     own = [
         name not in ("Custom", "Skirt/Brim", "Support material", "Support material interface")
-        for name in program.run.segment_type
+        for name in segment_types(program.run)
     ]
     rows = np.flatnonzero(np.array(own) & (program.run.program.part[program.run.segment_row] == part))
     beads: np.ndarray = program.run.deposited.segments(rows)
@@ -113,7 +114,7 @@ def test_copies_leave_room_for_their_rafts_and_each_stands_on_one() -> None:
     decomposition, settings = on_one_plate([model, model], profile)
     program = build(decomposition, settings)
     assert {finding.code for finding in program.run.findings} <= {"uncalibrated"}
-    props = [name.startswith("Support") for name in program.run.segment_type]
+    props = [name.startswith("Support") for name in segment_types(program.run)]
     rows = np.flatnonzero(np.array(props))
     part = program.run.program.part[program.run.segment_row[rows]]
     first, second = (program.run.deposited.segments(rows[part == k]).reshape(-1, 3) for k in (1, 2))

@@ -146,5 +146,5 @@ def test_layers_are_numbered_from_one_in_every_part() -> None:
 
 
 def test_poses_between_go_from_start_to_end_in_small_steps() -> None:
-    way = poses_between(Pose(0, 0), Pose(30, -40), 1.0)
-    assert (way[0], way[-1], len(way)) == (Pose(0, 0), Pose(30, -40), 51)
+    way = poses_between(Pose(0, 0), Pose(30, -40))
+    assert (way[0], way[-1], len(way)) == (Pose(0, 0), Pose(30, -40), 101)

@@ -71,7 +71,8 @@ def _least_distance(name: str, tips: np.ndarray) -> np.ndarray:
     """(n,) least distance of the head at (n, 3) tips from all that turns, over the poses of the turn."""
     machine = _machine(name)
     least = np.full(len(tips), np.inf)
-    for pose in poses_between(level(machine), TURN, 10.0):
+    poses = poses_between(level(machine), TURN)
+    for pose in (*poses[::20], poses[-1]):
         points = _turned(machine, pose)
         for k, tip in enumerate(tips):
             near = points[points[:, 2] > tip[2] - least[k]]

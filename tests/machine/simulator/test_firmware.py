@@ -10,6 +10,7 @@ from machine.link.protocol.framing import checksum, frame
 from machine.simulator.board import BuildOptions
 from machine.simulator.firmware import SimulatedFirmware
 from profiles.profile import load
+from tests.machine.peers import happened
 
 MACHINE = load().machine
 PLAIN = BuildOptions(advanced_ok=False, home_start=False)
@@ -283,7 +284,7 @@ def test_an_axis_driven_against_its_end_stays_there_unknown_to_the_firmware() ->
     firmware = printer()
     answer(firmware, "M211 S0\nG0 X200\nG0 X190\n")
     record = firmware.record()
-    assert record.happened("X driven against its end")
+    assert happened(record, "X driven against its end")
     assert record.end[:, 0].tolist() == [162.0, 152.0]
     assert firmware.board.motion.position[0] == 190.0
 

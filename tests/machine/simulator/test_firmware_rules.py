@@ -11,6 +11,7 @@ from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.motion import SLIP_MM
 from machine.simulator.simulator import SimulatedPrinter
 from tests.machine.firmware.test_dialects import profile
+from tests.machine.peers import happened
 
 RRF, KLIPPER, MARLIN = (profile(dialect).machine for dialect in ("reprapfirmware", "klipper", "marlin"))
 
@@ -174,10 +175,10 @@ def test_marlin_lets_x_y_and_z_go_after_two_idle_minutes_and_does_not_know_where
     firmware = SimulatedFirmware(MARLIN, BuildOptions(advanced_ok=False))
     answer(firmware, "G28\nG1 X5 Y5 Z50 F6000\nM400\n")
     answer(firmware, "", firmware.board.now_s + 119.0)
-    assert not firmware.record().happened("motors off")
+    assert not happened(firmware.record(), "motors off")
     answer(firmware, "M105\n", firmware.board.now_s + 2.0)  # no move: it does not count
     answer(firmware, "G1 X6 Y6 Z51\n")
-    assert firmware.record().happened("motors off")
+    assert happened(firmware.record(), "motors off")
     assert answer(firmware, "M114\n")[0].startswith("X:6.00 Y:6.00 Z:51.00")
     assert firmware.record().end[-1, :3] == pytest.approx([6.0 - SLIP_MM, 6.0 - SLIP_MM, 51.0 - SLIP_MM])
 
@@ -186,7 +187,7 @@ def test_m84_with_an_idle_time_of_0_keeps_marlin_s_motors_on() -> None:
     firmware = SimulatedFirmware(MARLIN)
     answer(firmware, "G28\nG1 X5\nM84 S0\nM400\n")
     answer(firmware, "", firmware.board.now_s + 10000.0)
-    assert not firmware.record().happened("motors off")
+    assert not happened(firmware.record(), "motors off")
 
 
 def test_klipper_shuts_down_after_ten_idle_minutes_and_moves_nothing_any_more() -> None:
@@ -195,9 +196,9 @@ def test_klipper_shuts_down_after_ten_idle_minutes_and_moves_nothing_any_more() 
     answer(firmware, "G28\nM104 S200\nG1 X5\nM400\n")
     answer(firmware, "", firmware.board.now_s + 599.0)
     answer(firmware, "G4 P1\n", firmware.board.now_s + 599.0)
-    assert not firmware.record().happened("motors off")
+    assert not happened(firmware.record(), "motors off")
     answer(firmware, "M105\nM400\n", firmware.board.now_s + 2.0)
-    assert (firmware.record().happened("motors off"), firmware.record().nozzle_target_c) == (True, 0.0)
+    assert (happened(firmware.record(), "motors off"), firmware.record().nozzle_target_c) == (True, 0.0)
     assert answer(firmware, "G1 X6\n")[0].startswith("!! Must home axis first: 6.000")
 
 
@@ -206,4 +207,4 @@ def test_reprapfirmware_holds_its_motors_with_less_current() -> None:
     firmware = SimulatedFirmware(RRF)
     answer(firmware, "G28\nG1 X5\nM84 S30\nM400\n")
     answer(firmware, "", firmware.board.now_s + 10000.0)
-    assert not firmware.record().happened("motors off")
+    assert not happened(firmware.record(), "motors off")

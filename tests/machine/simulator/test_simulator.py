@@ -15,7 +15,7 @@ from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.simulator import SimulatedPrinter
 from mdp.pose import Pose, rotation
 from profiles.profile import load
-from tests.machine.peers import PATIENCE_S
+from tests.machine.peers import PATIENCE_S, happened
 
 MACHINE = load().machine
 HOT = "M104 S200\nM109 S200\n"
@@ -109,7 +109,7 @@ def test_no_text_breaks_the_firmware(pieces: list[str]) -> None:
 def test_no_bytes_break_the_firmware(data: bytes) -> None:
     firmware = printer()
     answer(firmware, data + b"\n")
-    assert firmware.dead == (firmware.record().happened("M112"))
+    assert firmware.dead == (happened(firmware.record(), "M112"))
     assert firmware.dead or answer(firmware, "M105\n")[-1].startswith("ok T:")
 
 

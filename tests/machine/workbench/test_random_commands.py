@@ -12,7 +12,8 @@ import pytest
 
 from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import Bench, plan_of_bench, with_front, with_plan
-from machine.workbench.bench.settings import export_command, named
+from machine.workbench.bench.settings import export_command
+from machine.workbench.bench.values import with_value
 from machine.workbench.session.commands import obey
 from machine.workbench.session.session import Session
 from machine.workbench.work.models import Standing, read_model
@@ -164,7 +165,7 @@ class Tried:
                     await session.open_plan(self.plan)
                 case "profile file":
                     path = str(self.folder / "mine.toml")
-                    session.start(session.take_given("take it", lambda given: named(given, "machine", path)))
+                    session.start(session.take_given("take it", lambda given: with_value(given, "machine", path)))
                 case _:
                     obey(session, asked)
         except UserError:

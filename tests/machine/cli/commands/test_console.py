@@ -26,7 +26,7 @@ from machine.printing.command_session import CommandSession
 from machine.simulator.record import Record
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.profile import load
-from tests.machine.peers import hear_out, on_terminal, scripted
+from tests.machine.peers import happened, hear_out, on_terminal, scripted
 from tests.machine.person import Person
 
 MACHINE = load().machine
@@ -98,14 +98,14 @@ def test_a_command_that_the_printer_does_not_know_is_exit_1_at_the_end(done: Don
 ])  # fmt: skip
 def test_a_line_that_cannot_be_sent_is_a_sentence(done: Done, capsys: Capsys, line: str, words: str) -> None:
     code, record = done(f"M104 S200\n{line}\nG28\n")
-    assert (code, record.nozzle_target_c, record.happened("homed XYZAC")) == (1, 0.0, False)
+    assert (code, record.nozzle_target_c, happened(record, "homed XYZAC")) == (1, 0.0, False)
     assert words in capsys.readouterr().err.splitlines()[-1]
 
 
 def test_heaters_are_switched_off_on_leaving_and_that_is_said(done: Done, capsys: Capsys) -> None:
     code, record = done("M104 S200\nM140 S60\n")
     assert (code, record.nozzle_target_c, record.bed_target_c) == (0, 0.0, 0.0)
-    assert record.happened("nozzle 200")
+    assert happened(record, "nozzle 200")
     assert "switched off: nozzle set to 200 °C and bed set to 60 °C" in capsys.readouterr().err
 
 
@@ -118,7 +118,7 @@ def test_heaters_stay_on_when_that_is_asked_for(done: Done, capsys: Capsys) -> N
 @pytest.mark.parametrize("line", ["/stop", "M112", "M112 ; now"])
 def test_the_emergency_stop_halts_the_printer(done: Done, capsys: Capsys, line: str) -> None:
     code, record = done(f"M104 S200\n{line}\nG28\n")
-    assert (code, record.nozzle_target_c, record.happened("M112")) == (1, 0.0, True)
+    assert (code, record.nozzle_target_c, happened(record, "M112")) == (1, 0.0, True)
     assert "emergency stop: the printer has halted" in capsys.readouterr().err
 
 
@@ -297,7 +297,7 @@ def test_a_bug_while_a_line_is_sent_ends_the_console_with_the_heaters_off(
         code = main(["console", "--port", printer.path])
         later.cancel()
         assert (code, printer.record.nozzle_target_c) == (3, 0.0)
-        assert printer.record.happened("nozzle 200")
+        assert happened(printer.record, "nozzle 200")
     assert "ZeroDivisionError: planted; the printer reports its heaters off" in capsys.readouterr().err
 
 
@@ -310,7 +310,7 @@ def test_a_closed_terminal_leaves_with_the_heaters_off(after_s: float) -> None:
             person.see("ok")
             sleep(after_s)
             assert person.hang_up() == 130
-        assert (printer.record.happened("nozzle 200"), printer.record.nozzle_target_c) == (True, 0.0)
+        assert (happened(printer.record, "nozzle 200"), printer.record.nozzle_target_c) == (True, 0.0)
 
 
 def test_busy_lines_in_a_row_are_folded(capsys: Capsys) -> None:

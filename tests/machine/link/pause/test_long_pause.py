@@ -15,6 +15,7 @@ from machine.simulator.faults import Fault, FaultScript
 from profiles.errors import FirmwareError
 from profiles.profile import Profile, load
 from tests.machine.link.test_pause import BODY, PROGRAM, Watcher, is_exact
+from tests.machine.peers import happened
 from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 COOLS_S = 120.0
@@ -62,7 +63,7 @@ def test_a_pause_longer_than_any_firmware_s_idle_time_keeps_the_motors_on_and_th
     """Marlin lets X, Y and Z go after 120 s (Configuration_adv.h), Klipper shuts down after 600 s (idle_timeout.py)."""
     watcher = Patience(profile_of(dialect, minutes=0.0)).after(seconds, Command.RESUME)
     assert not watcher.run(PROGRAM).cancelled
-    assert not watcher.printer.record.happened("motors off")
+    assert not happened(watcher.printer.record, "motors off")
     assert is_exact(watcher)
 
 
@@ -152,7 +153,7 @@ def test_a_temperature_that_a_person_sets_in_a_pause_is_kept() -> None:
     watcher = Patience().after(60.0, Command.LINE, "M104 S215").after(120.0, Command.RESUME)
     watcher.run(PROGRAM)
     assert "M109 S215" in watcher.lines()
-    assert watcher.printer.record.happened("nozzle 215")
+    assert happened(watcher.printer.record, "nozzle 215")
 
 
 def test_what_a_person_does_in_a_pause_begins_its_time_anew() -> None:

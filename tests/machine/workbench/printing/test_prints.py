@@ -12,6 +12,8 @@ from collections.abc import Callable
 from contextlib import nullcontext
 from functools import cache
 from io import BytesIO
+from itertools import groupby
+from operator import itemgetter
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -318,6 +320,25 @@ def test_the_page_is_told_at_once_that_a_print_can_no_longer_be_resumed_and_name
         assert (heard.state["journal"], heard.state["status"].warning) == (str(tmp_path / "j"), "")
         show(PrintStatus(elapsed_s=2.0, warning="this print can no longer be resumed"))
     assert (heard.state["journal"], heard.state["status"].warning) == ("", "this print can no longer be resumed")
+
+
+def test_an_upload_is_no_moment_of_a_print_and_what_a_server_tells_besides_is_no_end_of_one(tmp_path: Path) -> None:
+    heard, log = Heard(), SerialLog(tmp_path / "log", "p")
+    person, told = AtPage(heard), list[tuple[str, bool, str]]()  # type: ignore[arg-type]
+    moments = [(True, PrintState.UPLOADING), (False, PrintState.PAUSED), (False, PrintState.READY), (False, PrintState.DONE)]
+    with log:
+        for uploads, scene_moments in groupby(moments, key=itemgetter(0)):
+            with person.show(Scene("p", log, server="s", uploads=uploads)) as show:
+                for _, state in scene_moments:
+                    show(PrintStatus(state, message=f"it is {state}"))
+                    status = heard.state["status"]
+                    told.append((status.state, heard.state["live"], status.message))
+    assert told == [
+        ("uploading", False, "it is uploading"),
+        ("paused", True, "it is paused"),
+        ("paused", True, "it is ready"),
+        ("paused", True, "it is done"),
+    ]
 
 
 @pytest.mark.parametrize(("kind", "profile"), [("octoprint", PROFILE), ("duet", load("gen5x"))])
