@@ -28,7 +28,7 @@ from profiles.errors import JournalError
 MOST_WORDS = 4
 WORD_LENGTH = 200  # characters of one: a lost connection takes two lines to tell
 COLOURS = {"printing": "green", "finishing": "green", "paused": "yellow", "pausing": "yellow", "resuming": "yellow"}
-KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  u d Z offset  e e emergency stop  ? more"
+KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  u d Z  ee emergency  ? more"
 EXIT_CODES = {PrintState.DONE: 0, PrintState.DECLINED: 1, PrintState.CANCELLED: 130, PrintState.LEFT: 130}
 
 
