@@ -309,7 +309,7 @@ def _override_flow(board: Board, order: Order) -> Work:
 
 
 def _babystep(board: Board, order: Order) -> Work:
-    """M290, SET_GCODE_OFFSET: the axis Z moves, at once or with the next move; the coordinate that the firmware believes stays."""
+    """M290, SET_GCODE_OFFSET: the axis Z moves, at once or with the next move; the coordinate as the firmware knows it stays."""
     named = order.name == "M290"
     board.motion.shift_z(order.words.get("Z", 0.0) if named else float(order.values.get("Z_ADJUST", 0.0)))
     if named or order.values.get("MOVE") == "1":
