@@ -111,7 +111,7 @@ export function showProgress(print) {
     [over ? "took" : "so far", duration(progress.elapsed_s)],
     !over && progress.left_s != null && ["done at", clock(Date.now() / 1000 + progress.left_s)],
   ].filter(Boolean));
-  tell({ "offset-told": `${progress.z_offset_mm > 0 ? "+" : ""}${progress.z_offset_mm} mm` });
+  tell({ "offset-told": `${progress.z_offset_mm > 0 ? "+" : ""}${progress.z_offset_mm} mm`.replace("-", "−") });
   for (const [id, percent] of [["feed", progress.feed_percent], ["flow", progress.flow_percent]]) {
     if ($(id).dataset.held) continue;
     $(id).value = percent;
