@@ -150,7 +150,8 @@ class PendingCommands:
         """Commands that reset the overrides, which the firmware would keep for the next print."""
         pairs = (("M220", self.feed_percent), ("M221", self.flow_percent))
         undone = [f"{name} S100" for name, value in pairs if value != 100.0]
-        return [*undone, self.babystep.format(f"{-self.z_offset_mm:.3f}")] if self.z_offset_mm else undone
+        shifted = self.babystep.format(f"{-self.z_offset_mm:.3f}").removesuffix(" MOVE=1")  # Klipper's motors may be off by now
+        return [*undone, shifted] if self.z_offset_mm else undone
 
     def _queue_line(self, text: str, state: PrintState) -> None:
         why = line_refusal(text, self.axes, state is PrintState.PAUSED, self.limit)

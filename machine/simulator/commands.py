@@ -308,9 +308,11 @@ def _override_flow(board: Board, order: Order) -> Work:
 
 
 def _babystep(board: Board, order: Order) -> Work:
-    """M290, SET_GCODE_OFFSET: the axis Z moves, what the firmware takes for its coordinate does not."""
-    by_mm = order.words.get("Z", 0.0) if order.name == "M290" else float(order.values.get("Z_ADJUST", 0.0))
-    board.motion.shift_z(by_mm, board.now_s)
+    """M290, SET_GCODE_OFFSET: the axis Z moves, at once or with the next move; the coordinate as the firmware knows it stays."""
+    named = order.name == "M290"
+    board.motion.shift_z(order.words.get("Z", 0.0) if named else float(order.values.get("Z_ADJUST", 0.0)))
+    if named or order.values.get("MOVE") == "1":
+        board.motion.reach(board.motion.position, board.now_s)
     return None
 
 

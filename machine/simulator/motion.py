@@ -197,10 +197,9 @@ class Motion:
             block.feed = self.feed_mm_s if feed_mm_s is None else feed_mm_s / self.feed_share
             self.planner.add(block, self.jerk_mm_s, now_s)
 
-    def shift_z(self, by_mm: float, now_s: float) -> None:
-        """Move Z by a baby step: every position is that much higher from here on."""
+    def shift_z(self, by_mm: float) -> None:
+        """A baby step: every position is that much higher from here on."""
         self._offset[2] += by_mm
-        self.reach(self.position, now_s)
 
     def _seconds(self, here: Sequence[float], destination: Sequence[float]) -> float:
         """Duration of a followed move at F, s."""

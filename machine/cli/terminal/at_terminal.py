@@ -27,7 +27,7 @@ WORD_LENGTH = 200  # of one message: a lost connection takes two lines to descri
 COLOURS = dict.fromkeys((PrintState.PRINTING, PrintState.FINISHING), "green") | dict.fromkeys(
     (*AWAY, PrintState.RESUMING), "yellow"
 )
-KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  u d Z offset  e e emergency stop  ? more"
+KEYS = "p pause  r resume  c cancel  + - feed  [ ] flow  u d Z  ee emergency  ? more"
 EXIT_CODES = {PrintState.DONE: 0, PrintState.DECLINED: 1, PrintState.CANCELLED: 130, PrintState.LEFT: 130}
 
 

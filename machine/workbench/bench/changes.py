@@ -257,15 +257,15 @@ def brush(bench: Bench, *, kind: Kind, faces: str, erase: bool = False) -> Zones
     stroke.check_on(mesh)
     chosen = stroke.faces(mesh)
     if erase:
-        return _with(bench.zones, kind, _erased(getattr(bench.zones, kind), mesh, chosen))
+        return with_value(bench.zones, kind, _erased(getattr(bench.zones, kind), mesh, chosen))
     zones: tuple[AnyZone, ...] = getattr(bench.zones, kind)
     index = next((k for k, zone in enumerate(zones) if isinstance(zone, Brushed)), len(zones))
     if index >= MOST_ZONES:
         raise PlanError(f"there are {index} zones of {kind}: {MOST_ZONES} are allowed")
     painted = chosen | zones[index].faces(mesh) if index < len(zones) else chosen
-    changed = _with(bench.zones, kind, (*zones[:index], Brushed.of(painted), *zones[index + 1 :]))
+    changed = with_value(bench.zones, kind, (*zones[:index], Brushed.of(painted), *zones[index + 1 :]))
     opposite = OPPOSITES.get(kind)
-    return changed if opposite is None else _with(changed, opposite, _erased(getattr(changed, opposite), mesh, chosen))
+    return changed if opposite is None else with_value(changed, opposite, _erased(getattr(changed, opposite), mesh, chosen))
 
 
 def _erased(zones: tuple[AnyZone, ...], mesh: Mesh, chosen: Mask) -> tuple[AnyZone, ...]:

@@ -13,7 +13,7 @@ STROKES += [f"G1 X{60 + k % 20} Y{60 + k // 20} E0.05 F1500" for k in range(300)
 FIRMWARES = [
     ("generic_ac", "M290 Z-0.050", "M290 Z0.050"),
     ("gen5x", "M290 R1 Z-0.050", "M290 R1 Z0.050"),
-    ("fractal5pro", "SET_GCODE_OFFSET Z_ADJUST=-0.050 MOVE=1", "SET_GCODE_OFFSET Z_ADJUST=0.050 MOVE=1"),
+    ("fractal5pro", "SET_GCODE_OFFSET Z_ADJUST=-0.050 MOVE=1", "SET_GCODE_OFFSET Z_ADJUST=0.050"),
 ]
 
 

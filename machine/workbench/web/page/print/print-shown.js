@@ -110,7 +110,7 @@ export function showProgress(print) {
     [over ? "took" : "so far", duration(print.elapsed_s)],
     !over && print.left_s != null && ["done at", clock(Date.now() / 1000 + print.left_s)],
   ].filter(Boolean));
-  tell({ "offset-told": `${print.z_offset_mm > 0 ? "+" : ""}${print.z_offset_mm} mm` });
+  tell({ "offset-told": `${print.z_offset_mm > 0 ? "+" : ""}${print.z_offset_mm} mm`.replace("-", "−") });
   for (const [id, percent] of [["feed", print.feed_percent], ["flow", print.flow_percent]]) {
     if ($(id).dataset.held) continue;
     $(id).value = percent;
@@ -125,7 +125,7 @@ export const pastCells = ({ name, outcome, seconds, filament_m: metres, begun })
 
 export function showHistory(prints = []) {
   hide({ "history-field": !prints.length });
-  putTable($("history"), prints, ["print", "outcome", "time", "filament", "begun"], () => prints.map((print) => rowOf(pastCells(print))));
+  putTable($("past-prints"), prints, ["print", "outcome", "time", "filament", "begun"], () => prints.map((print) => rowOf(pastCells(print))));
 }
 
 /** The bar at the foot is there on every tab while anything prints; it is of the print that is looked at, where that runs. */
