@@ -250,6 +250,7 @@ def test_the_page_of_the_computer_lists_devices_and_lets_them_go(bench: OpenToNe
     browser.open(bench.address)
     browser.wait("$('devices').querySelector('li')")
     assert "is asked for the code that the terminal shows" in browser.value("$('network-told').textContent")
+    browser.wait("$('network-code').checkVisibility() && $('network-code').naturalWidth > 20")  # the address as a QR code
     assert bench.code() not in browser.value("document.documentElement.outerHTML")
     browser.value("$('network').scrollIntoView()")
     browser.screenshot(tmp_path / "devices.png")

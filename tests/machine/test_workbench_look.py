@@ -4,7 +4,7 @@ import pytest
 
 from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
-from tests.machine.running_workbench import Running
+from tests.machine.running_workbench import QUICK, Running, workbench
 from tests.machine.test_workbench_page import IDLE, drag_slider, open_model
 from tests.shapes import box, tee
 
@@ -54,6 +54,19 @@ def test_where_nothing_lies_a_card_opens_a_demo_by_its_picture(browser: Browser,
     assert browser.value("asked") == 2
     browser.click("[data-demo='demo:bracket']")
     browser.wait("$('title').textContent === 'demo:bracket' && !$('drop').checkVisibility()")
+
+
+def test_earlier_work_is_offered_where_nothing_is_open_and_under_model_else(browser: Browser) -> None:
+    with workbench(*QUICK) as own:
+        with own.line() as page:
+            page.do("demo", name="demo:bracket")
+            page.until(lambda state: state["model"] and not state["busy"])
+        root = own.place.rsplit("/", 2)[0]
+        assert own.ask(f"{root}/benches/1", "DELETE", Origin=f"http://127.0.0.1:{own.port}")[0] == 200
+        browser.open(f"http://127.0.0.1:{own.port}{root}/")
+        browser.wait("$('drop').textContent.includes('demo:bracket') && $('kept-works').checkVisibility()")
+        browser.click("#kept-works button")
+        browser.wait("$('title').textContent === 'demo:bracket' && $('earlier-work').contains($('kept-field'))")
 
 
 @pytest.mark.parametrize("size", [(1280, 800), (720, 900), (390, 844)])

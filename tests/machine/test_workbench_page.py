@@ -391,3 +391,5 @@ def test_without_webgl_the_numbers_and_the_front_are_there(bench: Running) -> No
         assert blind.value("$('blind').checkVisibility() && $('undo').checkVisibility() && !$('fit').checkVisibility()")
         find_as_it_lies(blind)
         assert "area to support" in blind.value("$('front-told').textContent")
+        blind.click("#parts-list [value='2']")
+        blind.wait("$('plane-tools').checkVisibility() && $('save').checkVisibility()")

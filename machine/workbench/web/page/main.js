@@ -1,6 +1,6 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, button, disable, duration, hide, listen, made, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
+import { $, button, duration, hide, listen, made, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
 import { putNew, withWholeOptions } from "./lists.js";
@@ -76,9 +76,9 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
   root.dataset.busy = busy;
   root.toggleAttribute("data-searching", Boolean(search));
   toggle("no-model", !model);
-  toggle("has-model", model);
-  $("undo").ariaLabel = undo ? `undo: ${undo}` : "undo";
-  $("redo").ariaLabel = redo ? `redo: ${redo}` : "redo";
+  for (const [id, word] of Object.entries({ undo, redo })) $(id).ariaLabel = word ? `${id}: ${word}` : id;
+  const place = $(model ? "earlier-work" : "drop"); // where nothing is open, it is offered at once
+  if (!place.contains($("kept-field"))) place.append($("kept-field"));
 }
 
 /** What asks the bench for something cannot be pressed while there is no line to it; prints have a line of their own. */
