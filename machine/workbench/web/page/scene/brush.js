@@ -56,7 +56,7 @@ export function brushOf(picture) {
     hover,
     take: (event) => {
       if (store.clicks !== "brush" || event.button === 1 || !met(event, picture)) return null;
-      const marks = store.faceMarks || new Uint8Array(store.triangles.count);
+      const marks = store.faceMarks?.length === store.triangles.count ? store.faceMarks : new Uint8Array(store.triangles.count);
       stroke = { kind: kindNow(), bit: bitNow(), erases: erasing(event), marks, faces: new Set(), last: event };
       move(event);
       return { move: (later) => { if (stroke) move(later); }, put: end((done) => { if (done.faces.size) send(done); }), drop };
