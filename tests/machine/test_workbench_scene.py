@@ -124,7 +124,7 @@ def test_two_points_are_measured_corners_attract_and_faces_have_an_angle(browser
     browser.press(*seen(browser, 10, 0, 20))  # the right side
     browser.wait("$('measure-told').textContent.endsWith('faces at 90.0°')")
     browser.key("Escape")
-    browser.wait("$('measure-told').hidden && $('measure-lines').hasAttribute('hidden')")
+    browser.wait("$('measure-told').hidden && $('measure-path').getAttribute('d') === ''")
     assert browser.complaints == []
 
 

@@ -21,7 +21,7 @@ function rangesOf(numbers) {
 /** {take(event): a stroke as `handle` holds it, null: there is nothing to paint; hover(event): the circle under a hand, null: none}. */
 export function brushOf(picture) {
   let stroke = null; // {kind, bit, erases, marks: before it, faces: those that it changes, last: the newest event}
-  const radius = () => numberIn("brush-radius"), erasing = (event) => event.shiftKey || event.button === 2 || $("mark-erase").ariaPressed === "true";
+  const radius = () => numberIn("brush-radius"), erasing = (event) => event.shiftKey || event.button === 2 || $("mark-erase").getAttribute("aria-pressed") === "true";
   const rimOf = ({ place, normal }) => chained(ringOf(place, turned(picture.matrix(), normal), radius(), 48));
   const circleAt = (spot, colour) => picture.extra("brush", spot ? JSON.stringify([spot.place, radius(), colour]) : "", () => (
     spot ? [{ lines: trianglesOf([{ corners: rimOf(spot), colour: [...colour, 255] }]), over: true }] : []

@@ -25,7 +25,7 @@ const WANTED = {
 export function clicksOf(picture) {
   for (const [clicks, [id]] of Object.entries(WANTED)) listen("click", { [id]: () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null }) });
   NEEDS_PICTURE.forEach((clicks) => disable({ [WANTED[clicks][0]]: !picture }));
-  listen("click", { "mark-erase": () => pressed("mark-erase", $("mark-erase").ariaPressed !== "true") });
+  listen("click", { "mark-erase": () => pressed("mark-erase", $("mark-erase").getAttribute("aria-pressed") !== "true") });
   listen("change", { "mark-kind": () => update({ corner: null }) });
   subscribe((now, before) => {
     if (now.clicks && now.tab !== before.tab) update({ clicks: "", corner: null });
