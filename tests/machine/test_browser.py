@@ -301,6 +301,7 @@ def test_where_there_is_no_choice_no_front_is_shown(page: Browser) -> None:
 def test_a_finding_is_marked_and_a_click_goes_there(page: Browser) -> None:
     finding = program()[1].run.findings[0]
     put(page, "position", 0)
+    page.value(PICTURE)  # markers come with the first picture
     page.click("#markers button")
     assert text(page, "readout-line") == str(finding.line)
     assert page.value("document.querySelector('#findings .chosen').textContent").startswith(f"error: {finding.code}")

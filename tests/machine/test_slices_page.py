@@ -252,7 +252,7 @@ def test_errors_of_the_slices_refuse_a_print_at_once_and_stale_slices_cannot_be_
 def test_copies_and_pauses_are_typed_told_and_taken_away(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "box.stl", stl(box(8, 8, 4)))
     browser.click("#tab-slices")
-    scene = "box: [[-4, -4, 0], [4, 4, 4]], shifts: [], plane: null, extras: {}"
+    scene = "box: [[-4, -4, 0], [4, 4, 4]], shifts: [], extras: {}"
     walls = "[[-30, -20, 0], [30, 20, 4]].map((place) => ({ places: new Float32Array(place) }))"
     names = "{ ...modules['picture/math'], ...modules['scene/picture'] }"
     framed = browser.value(f"(({{ bounds, placesDrawn }}) => bounds(placesDrawn({{ {scene}, walls: {walls} }}).flat()))({names})")

@@ -1,7 +1,7 @@
 // Store: all that the page knows and shows, and the one way in which that changes. Whoever shows some of it subscribes.
 
 /** state: as the server tells it; line: how the line to it stands, a word of LINE_TOLD; tab: what is looked at; triangles: of the model, null: none is drawn; turning: rows of the rotation under
- * a hand; placing: x, y of the model's middle on the plate under a hand; seen: {size_mm} of the triangles as they are drawn; clicks: what the next one on the model is for: "", "lay", "snap", "faces", "box"; part: the chosen one, 0: none; facets: on which the model rests, and which is lit; figures: of the
+ * a hand; placing: x, y of the model's middle on the plate under a hand; seen: {size_mm} of the triangles as they are drawn; clicks: what the next one on the model is for: "", "lay", "snap", "limb", "brush", "faces", "box", "measure"; part: the chosen one, 0: none; facets: on which the model rests, and which is lit; figures: of the
  * planes on the bench, as last known; hand: a plane under a hand, see planes.js; row: of the front, before it is taken; pieces, apart: the parts as bodies, and how far they are drawn apart;
  * corner: the first one of a box; zone, zoneHand: the chosen mark, and as a hand has it; faceMarks, pedestal, walls: as they came from the server; looking: at the print, "gcode": at the G-code file that is open. */
 export const store = {

@@ -62,10 +62,9 @@ export function ringsOf(picture) {
     const ring = turning ? turning.ring : ringNow(), eye = picture.eye();
     groups.forEach((group) => {
       const points = ringPoints(RING_AXES[group.dataset.ring], ring), middle = length(sub(eye, ring.centre));
-      const sides = points.map((place) => ({ at: picture.placeOf(place), near: length(sub(eye, place)) < middle }));
-      const seen = sides.flatMap((spot, k) => (k && spot.near !== sides[k - 1].near ? [{ ...spot, near: !spot.near }, spot] : [spot]));
+      const seen = points.map((place) => ({ at: picture.placeOf(place), near: length(sub(eye, place)) < middle }));
       group.classList.toggle("turning", Boolean(turning) && turning.axis === group.dataset.ring);
-      const parts = { far: ({ near }) => !near, near: ({ near }) => near, reach: () => true };
+      const parts = { far: () => true, near: ({ near }) => near, reach: () => true };
       for (const [name, wanted] of Object.entries(parts)) group.querySelector(`.${name}`).setAttribute("d", pathOf(seen, wanted));
       const label = seen.reduce((best, spot) => (spot.at && spot.near && (!best || spot.at[1] < best[1]) ? spot.at : best), null) || [-99, -99];
       group.querySelector("text").setAttribute("x", label[0]);

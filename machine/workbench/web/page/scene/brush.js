@@ -21,7 +21,7 @@ function rangesOf(numbers) {
 /** {take(event): a stroke as `handle` holds it, null: there is nothing to paint; hover(event): the circle under a hand, null: none}. */
 export function brushOf(picture) {
   let stroke = null; // {kind, bit, erases, marks: before it, faces: those that it changes, last: the newest event}
-  const radius = () => numberIn("brush-radius"), erasing = (event) => event.shiftKey || event.button === 2 || $("mark-erase").ariaPressed === "true";
+  const radius = () => numberIn("brush-radius"), erasing = (event) => event.shiftKey || event.button === 2 || $("mark-erase").getAttribute("aria-pressed") === "true";
   const rimOf = ({ place, normal }) => chained(ringOf(place, turned(picture.matrix(), normal), radius(), 48));
   const circleAt = (spot, colour) => picture.extra("brush", spot ? JSON.stringify([spot.place, radius(), colour]) : "", () => (
     spot ? [{ lines: trianglesOf([{ corners: rimOf(spot), colour: [...colour, 255] }]), over: true }] : []
@@ -56,7 +56,7 @@ export function brushOf(picture) {
     hover,
     take: (event) => {
       if (store.clicks !== "brush" || event.button === 1 || !met(event, picture)) return null;
-      const marks = store.faceMarks || new Uint8Array(store.triangles.count);
+      const marks = store.faceMarks?.length === store.triangles.count ? store.faceMarks : new Uint8Array(store.triangles.count);
       stroke = { kind: kindNow(), bit: bitNow(), erases: erasing(event), marks, faces: new Set(), last: event };
       move(event);
       return { move: (later) => { if (stroke) move(later); }, put: end((done) => { if (done.faces.size) send(done); }), drop };

@@ -25,7 +25,7 @@ const WANTED = {
 export function clicksOf(picture) {
   for (const [clicks, [id]] of Object.entries(WANTED)) listen("click", { [id]: () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null }) });
   NEEDS_PICTURE.forEach((clicks) => disable({ [WANTED[clicks][0]]: !picture }));
-  listen("click", { "mark-erase": () => pressed("mark-erase", $("mark-erase").ariaPressed !== "true") });
+  listen("click", { "mark-erase": () => pressed("mark-erase", $("mark-erase").getAttribute("aria-pressed") !== "true") });
   listen("change", { "mark-kind": () => update({ corner: null }) });
   subscribe((now, before) => {
     if (now.clicks && now.tab !== before.tab) update({ clicks: "", corner: null });
@@ -50,7 +50,7 @@ export function handsOf(camera, picture) {
     $("brush-radius").value = numberIn("brush-radius") * by;
     $("brush-radius").dispatchEvent(new Event("input"));
   };
-  const pressed = (event) => (store.clicks === "measure" && !apartNow() ? measure.press(event) : press(event, picture));
+  const clicked = (event) => (store.clicks === "measure" && !apartNow() ? measure.press(event) : press(event, picture));
   canvas.addEventListener("pointermove", (event) => { if (!event.buttons) [brush, measure].forEach(({ hover }) => hover(event)); });
   canvas.addEventListener("dblclick", (event) => {
     const spot = store.clicks ? null : met(event, picture);
@@ -62,7 +62,7 @@ export function handsOf(camera, picture) {
     if (event.key !== "Enter" || !store.clicks) return;
     const stroke = brush.take(middle);
     if (stroke) stroke.put();
-    else pressed(middle);
+    else clicked(middle);
   });
   const nextSection = () => {
     const options = [...$("section-along").options].filter(({ disabled }) => !disabled), next = options.findIndex(({ selected }) => selected) + 1;
@@ -80,7 +80,7 @@ export function handsOf(camera, picture) {
     const part = store.clicks ? 0 : partMet(event, picture);
     if (part) openMenu(part, event.clientX, event.clientY);
   };
-  return { changed: picture.ask, pressed, asked, take: brush.take };
+  return { changed: picture.ask, pressed: clicked, asked, take: brush.take };
 }
 
 /** A click on the model: the facet is laid down, or the plane takes its place, or a mark is put there when that was asked for; else a part is

@@ -1,6 +1,6 @@
 // Measure: two points of the model, the distance between them, and the angle between the faces on which they lie.
 
-import { $, hide } from "../../../../view/template/elements.js";
+import { $, hide, tell } from "../../../../view/template/elements.js";
 import { HALF_HEIGHT } from "../../../../view/template/picture/camera.js";
 import { add, dot, length, RAD, scaled, sub } from "../../../../view/template/picture/math.js";
 import { store, subscribe } from "../store.js";
@@ -40,18 +40,16 @@ export function measureOf(picture) {
     picture.ask();
   };
   picture.drawn.push(() => {
-    const on = store.clicks === "measure" && store.triangles, shown = on ? [...points, ...(candidate && points.length < 2 ? [candidate] : [])] : [];
+    const on = store.clicks === "measure" && store.triangles, shown = on ? [...points, candidate].filter(Boolean).slice(0, 2) : [];
     const places = shown.map(({ at }) => picture.carried(at)), seen = places.map(picture.placeOf);
     const drawn = seen.every(Boolean), whole = drawn && seen.length === 2;
     hide({ "measure-told": !whole });
-    document.getElementById("measure-lines").toggleAttribute("hidden", !on);
     const dots = drawn ? seen.map(([x, y], k) => `M${x - 4} ${y}a4 4 0 1 0 8 0a4 4 0 1 0 -8 0${shown[k].vertex ? `M${x - 7} ${y - 7}h14v14h-14z` : ""}`) : [];
     const middle = whole && scaled(add([...seen[0], 0], [...seen[1], 0]), 0.5);
     const lines = whole ? `M${seen[0]}L${seen[1]}M${middle.slice(0, 2)}l${LABEL}` : "";
     $("measure-path").setAttribute("d", dots.join("") + lines);
     if (!whole) return;
-    const words = inWords(shown, places);
-    if ($("measure-told").textContent !== words) $("measure-told").textContent = words;
+    tell({ "measure-told": inWords(shown, places) });
     const room = [$("canvas").clientWidth - $("measure-told").offsetWidth, $("canvas").clientHeight - $("measure-told").offsetHeight];
     $("measure-told").style.transform = `translate(${LABEL.map((by, k) => Math.max(Math.min(middle[k] + by, room[k]), 0)).join("px, ")}px)`;
   });

@@ -4,7 +4,7 @@ import { alike, nextFrame } from "../../../../view/template/elements.js";
 import { cameraOf, placeOn } from "../../../../view/template/picture/camera.js";
 import { cardOf, frameOf, outgrown, outlive, sizeOf } from "../../../../view/template/picture/gl.js";
 import { add, bounds, carried, cornersOf, dot, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
-import { beside, bodiesOf, boxEdges, cutsOf, FROM_BELOW, ON_PLATE, planesOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
+import { bodiesOf, boxEdges, cutsOf, FROM_BELOW, ON_PLATE, planesOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { bodyOf, clipOf, MOST_CUTS, solidOf } from "../../../../view/template/picture/solids.js";
 import { markedOver } from "../parts/marks-panel.js";
 import { piecesOn } from "../parts/pieces.js";
@@ -17,17 +17,16 @@ const ON_SECTION_MM = 1e-3;
 const ON_FACES = 1e-4; // in depth, by which lines are seen before what they lie on
 
 /** Corners of boxes about all that is drawn but the table, the model in the middle of that: the model and its copies, or its parts, and walls, planes, marks and what is in the way. */
-export function placesDrawn({ box, place = [0, 0, 0], copies = [], pieces, shifts, walls, plane, pedestal, extras }) {
+export function placesDrawn({ box, place = [0, 0, 0], copies = [], pieces, shifts, walls, pedestal, extras }) {
   const shifted = (box, shift) => box.map((corner) => add(corner, shift));
   const stood = () => [
     ...[...(walls || []).values()].map(({ places }) => shifted(bounds(places), scaled(place, -1))), pedestal ? bounds(pedestal.vertices) : [],
     ...[[0, 0, 0], ...copies].map((shift) => shifted(box, shift)),
   ];
   const whole = pieces ? pieces.parts.map((part, k) => shifted(part.box, shifts[k])) : stood();
-  const rim = plane ? beside(plane.normal).flatMap((way) => [1, -1].map((sign) => add(plane.centre_mm, scaled(way, sign * plane.radius_mm)))) : [];
   const around = Object.values(extras).flat().flatMap(({ solid, lines, matrix = IDENTITY }) => [solid, lines].filter((shape) => shape?.places.length)
     .flatMap(({ places }) => cornersOf(bounds(places)).map((place) => carried(matrix, place))));
-  return [...whole.filter((box) => box.length).flatMap(cornersOf), ...rim, ...around];
+  return [...whole.filter((box) => box.length).flatMap(cornersOf), ...around];
 }
 
 /** Drawings of the walls of parts, by the walls; those that were there before are kept. */
@@ -53,7 +52,7 @@ export function pictureOf(canvas, camera) {
   if (!gl) return null;
   const scene = {
     model: null, matrix: IDENTITY, place: [0, 0, 0], copies: [], box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, marks: null, pieces: null, shifts: [], chosen: 0,
-    walls: null, plane: null, section: null, pedestal: null, machine: null, dark: false, extras: {},
+    walls: null, section: null, pedestal: null, machine: null, dark: false, extras: {},
   };
   const drawn = [], toldOf = {}, stale = new Map(); // by the name of what is to be made anew before it is drawn: whether its colours alone are others
   let card = {}, frame = null, colours = null, count = 0, placed = "";
@@ -68,10 +67,6 @@ export function pictureOf(canvas, camera) {
     pedestal: () => scene.pedestal && solidOf(gl, { places: scene.pedestal.corners, colours: paintedRed(scene.pedestal.count, null, PEDESTAL_COLOUR) }),
     pieces: () => scene.pieces && piecesOn(gl, scene.pieces, scene.chosen),
     walls: (before) => wallsOn(gl, scene.walls, before),
-    plane: () => {
-      const { discs, rims } = scene.plane ? planesOf([{ base: scene.plane, direction: scene.plane.normal }], () => PLANE_COLOUR) : {};
-      return bodyOf(gl, { solid: discs, lines: rims });
-    },
   };
   const renew = () => {
     for (const [name, coloursAlone] of stale) {
@@ -102,7 +97,6 @@ export function pictureOf(canvas, camera) {
       }
     }
     if (below) card.table.draw(ground, { ...FROM_BELOW, lift: ON_PLATE });
-    card.plane.draw(flat, { strength: 0.3, lift: ON_FACES });
     Object.keys(scene.extras).forEach((name) => card[name].draw(seenAs));
     frame.show();
     scene.toClip = flat.toClip;
@@ -175,7 +169,10 @@ export function pictureOf(canvas, camera) {
     /** The walls of what is sliced, triangles of each part, with the model and its copies as ghosts about them; null: none. */
     walls: take("walls"),
     /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */
-    plane: take("plane"),
+    plane: (plane) => extra("plane", plane ? JSON.stringify(plane) : "", () => {
+      const { discs, rims } = planesOf(plane ? [{ base: plane, direction: plane.normal }] : [], () => PLANE_COLOUR);
+      return [{ solid: discs, lines: rims, strength: 0.3 }];
+    }),
     /** The triangles of what the model stands on, in the platform's frame, or none. */
     pedestal: take("pedestal"),
     /** Where the middle of all that is drawn but the walls stands on the plate, and its copies, from there. */

@@ -12,9 +12,13 @@ export function sectionView(picture) {
     picture.section(store.triangles ? sectionAsked(picture.box(), cut) : null);
   };
   listen("input", { "section-at": show });
-  listen("change", { "section-flip": show, "section-along": () => {
+  const open = () => { // towards the eye
     $("section-at").value = 0;
+    $("section-flip").checked = false;
     show();
-  } });
+    $("section-flip").checked = !picture.cutAway(picture.eye());
+    show();
+  };
+  listen("change", { "section-flip": show, "section-along": open });
   subscribe(show);
 }
