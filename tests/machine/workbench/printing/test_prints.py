@@ -487,7 +487,13 @@ def test_an_emergency_stop_is_given_whatever_else_a_page_sends(number: dict[str,
     assert stopped == [1]
 
 
-GIVEN = {"percent": 100, "does": "heat"}
+@pytest.mark.parametrize("by_mm", [float("inf"), float("nan"), "up", 2.5, None])
+def test_a_z_offset_that_is_no_small_number_is_refused(by_mm: object) -> None:
+    with pytest.raises(PlanError, match=r"by_mm is .*"):
+        obey(page_of(prints_with_one()), {"do": "babystep", "print": 1, "by_mm": by_mm})
+
+
+GIVEN = {"percent": 100, "does": "heat", "by_mm": 0.01}
 
 
 @pytest.mark.parametrize(
