@@ -1,6 +1,6 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, button, duration, hide, listen, made, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
+import { $, button, disable, duration, hide, listen, made, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
 import { putNew, withWholeOptions } from "./lists.js";
