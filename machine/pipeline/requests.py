@@ -65,7 +65,7 @@ class ModelRequest:
     material and process as the user has given them, names or files, and KEY=VALUE over them. project: the project file that the
     model comes from; own_marks: the boxes that the model's own file marks count beside those of the plan, which has them else.
     stops: where the print waits for a person. copies: the number of each model on the plate; beside: the other models there.
-    plate: of each model's slicer file; None: the first that holds something.
+    plate: of each model's slicer file; None: the first that holds something. verbose: tell what the search has tried, too.
     """
 
     model: str
@@ -87,6 +87,7 @@ class ModelRequest:
     copies: int = 1
     beside: tuple[str, ...] = ()
     plate: int | None = None
+    verbose: bool = False
 
     @property
     def name(self) -> str:

@@ -159,8 +159,8 @@ def _front(decomposition: Decomposition) -> list[Table]:
         time = "–" if row.time_s is None else duration(row.time_s)
         filament = "–" if row.filament_mm is None else f"{row.filament_mm / 1000:.1f}"
         areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", f"{row.cost_mm2:.1f}"]
-        rows.append([f"{row.parts}{' (taken)' * row.chosen}", *areas, time, filament])
-    notes = [f"taken: {row.reason}" for row in front if row.chosen]
+        rows.append([f"{row.parts}{' (chosen)' * row.chosen}", *areas, time, filament])
+    notes = [f"chosen: {row.reason}" for row in front if row.chosen]
     notes.append("--parts takes another row; time and filament are estimates")
     return [
         _table("In how many parts", ["parts", "support mm²", "seams mm", "stairs mm²", "costs mm²", "about", "m"], rows, notes)

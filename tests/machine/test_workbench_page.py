@@ -122,7 +122,7 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     browser.click("#orient")
     browser.value("$('ranker').value = 'learned'")
     browser.click("#find")
-    browser.wait("$('front-notes').textContent.includes('it is laid down on its front (turned 90 about x): in one piece')")
+    browser.wait("$('front-notes').textContent.includes('oriented on its front (turned 90 about x): in one piece')")
     assert browser.value("$('laid').textContent") == "as it stoodas it lies now"
     browser.wait(f"{SHARES_DRAWN}.every((share) => share > 0.05 && share < 0.9)")  # of both small pictures
     browser.click("#undo")

@@ -96,33 +96,37 @@ def _profile_option(kind: str, otherwise: str = "") -> Any:
     return typer.Option(f"--{kind}", metavar="NAME|FILE", autocompletion=_names_of(kind), help=words)
 
 
-Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME")]
+Model = Annotated[
+    str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP, IGES or DAE file, or demo:NAME")
+]
 Models = Annotated[
     list[str],
     typer.Argument(
         metavar="MODEL",
         show_default=False,
-        help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME; several share the plate, NAME:3 is three of it",
+        help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP, IGES or DAE file, or demo:NAME; several share a plate, NAME:3 is three",
     ),
 ]
 ModelsOrGcode = Annotated[
     list[str],
     typer.Argument(
-        metavar="MODEL|FILE.gcode", show_default=False, help="model files or demo:NAME, as of export, or a G-code file"
+        metavar="MODEL|FILE.gcode", show_default=False, help="model files or demo:NAME, as for export, or a G-code file"
     ),
 ]
 MachineName = Annotated[str, _profile_option("machine")]
 MachineGiven = Annotated[str | None, _profile_option("machine", OF_FILE)]
-Settings = Annotated[tuple[str, ...], option("--set KEY=VALUE", "override a profile key; repeatable")]
+Settings = Annotated[
+    tuple[str, ...], option("--set KEY=VALUE", "override a profile key, as process.infill_density=20%; repeatable")
+]
 JsonFile = Annotated[Path | None, option("--json FILE", "write the result as JSON; - for standard output")]
 HtmlFile = Annotated[Path | None, option("--html FILE", "page that shows it in a browser, see view")]
 Force = Annotated[bool, option("--force", "go on although the dry run found errors")]
-ForceAll = Annotated[bool, option("--force", "go on although dry run, printer, machine and program do not agree")]
-LogFile = Annotated[Path | None, option("--log FILE", "what is sent and received; else a new file in the state folder")]
+ForceAll = Annotated[bool, option("--force", "go on although the dry run or the printer disagrees")]
+LogFile = Annotated[Path | None, option("--log FILE", "record of what is sent and received; else a new file in the state folder")]
 Baud = Annotated[int, option("--baud N", "bits a second")]
 PortOrSim = Annotated[str, option("--port PORT|sim", "serial port; sim: the simulated printer")]
 SimSpeed = Annotated[float, option("--sim-speed X", "X times real time; 0: as fast as possible")]
-NoBrowser = Annotated[bool, option("--no-browser", "only tell the address")]
+NoBrowser = Annotated[bool, option("--no-browser", "only print the address")]
 
 
 @dataclass(frozen=True)
@@ -131,7 +135,7 @@ class SearchOptions:
 
     beam_width: Annotated[int | None, option("--beam-width B", "decompositions followed at a time")] = None
     search: Annotated[str | None, option("--search best|published", "published: as the 2020 paper searches")] = None
-    time_limit: Annotated[float | None, option("--time-limit SECONDS", "then the best parts so far are used")] = None
+    time_limit: Annotated[float | None, option("--time-limit SECONDS", "stop the search and use the best parts so far")] = None
     ranker: Annotated[
         str,
         option(
@@ -139,13 +143,13 @@ class SearchOptions:
             "which candidates the beam follows: by the 2020 paper's order, by the network that ships, or by one of your own",
         ),
     ] = "classic"
-    orient: Annotated[
-        bool | None, option("--orient/--as-is", "lay the model down in the cheapest orientation, or print it as its file has it")
-    ] = None
-    parts: Annotated[int | None, option("--parts N", "into N parts at most, not as many as pay")] = None
+    orient: Annotated[bool | None, option("--orient/--as-is", "choose the model's orientation, or keep that of its file")] = None
+    parts: Annotated[int | None, option("--parts N", "cut into at most N parts; else as many as are worth it")] = None
     part: Annotated[
         tuple[str, ...], option("--part N:KEY=VALUE,...", "process keys of part N alone, as 2:walls=4; repeatable")
     ] = ()
+
+    verbose: Annotated[bool, option("-v --verbose", "also say how many cuts the search tried and why it rejected them")] = False
 
     @property
     def settings(self) -> list[str]:
@@ -174,12 +178,12 @@ class ProgramOptions(FileOptions):
         tuple[Path, ...], option("--plan FILE", "cut by this plan of decompose, without a search; one for each model")
     ] = ()
     pause: Annotated[
-        tuple[str, ...], option("--pause PART:LAYER", "wait for a person before this layer, or at a height: 1:8.4mm; repeatable")
+        tuple[str, ...], option("--pause PART:LAYER", "pause before this layer, or at a height: 1:8.4mm; repeatable")
     ] = ()
     filament_change: Annotated[
-        tuple[str, ...], option("--filament-change PART:LAYER", "the same, for another filament; repeatable")
+        tuple[str, ...], option("--filament-change PART:LAYER", "pause there to change the filament; repeatable")
     ] = ()
-    copies: Annotated[int | None, option("--copies N", "number of copies of each model on the plate, 1 by default")] = None
+    copies: Annotated[int | None, option("--copies N", "copies of each model on the plate; 1 by default")] = None
 
 
 @dataclass(frozen=True)
@@ -283,6 +287,7 @@ def model_request(
         parts=search.parts,
         copies=1 if copies is None else copies,
         plate=file.plate,
+        verbose=search.verbose,
         **further,
     )
     return request if project is None else project.applied(request, Path(model), copies)

@@ -23,17 +23,17 @@ class DecomposeOptions:
     """Files that decompose reads and writes besides the model."""
 
     out: Annotated[Path | None, option("-o --out DIR", "folder for part-NN.stl, 3MF, JSON")] = None
-    plan: Annotated[Path | None, option("--plan FILE", "where FILE exists: cut by it without a search; else write it")] = None
-    planes: Annotated[Path | None, option("--planes FILE", "planes by hand, cut first; the search finds the others")] = None
+    plan: Annotated[Path | None, option("--plan FILE", "cut by this plan, without a search, if it exists; else write it")] = None
+    planes: Annotated[Path | None, option("--planes FILE", "planes to cut first; the search adds others")] = None
     json: options.JsonFile = None
     png: Annotated[Path | None, option("--png FILE", "picture of the parts")] = None
     sheet: Annotated[Path | None, option("--sheet FILE", "picture of the print order, tilted as printed")] = None
-    front: Annotated[Path | None, option("--front FILE", "picture of how every number of parts would cut the model")] = None
+    front: Annotated[Path | None, option("--front FILE", "picture of the cuts for every number of parts")] = None
     html: options.HtmlFile = None
-    record: Annotated[Path | None, option("--record FILE", "what the search saw, as .npz for training")] = None
-    compare: Annotated[
-        bool, option("--compare", "slice the parts: tell how their joints lie, and time and material in one part")
-    ] = False
+    record: Annotated[Path | None, option("--record FILE", "training data of the search, as .npz")] = None
+    compare: Annotated[bool, option("--compare", "slice the parts, and show their joints, and time and material in one part")] = (
+        False
+    )
 
     def request(self, model: str, search: options.FileOptions, given: options.ProfileOptions) -> ModelRequest:
         """What is asked for of a model: a plan that exists is cut by, another is written."""
@@ -59,8 +59,8 @@ class ExportOptions:
     json: options.JsonFile = None
     svg: Annotated[Path | None, option("--svg FILE", "picture of one layer, see --layer")] = None
     html: options.HtmlFile = None
-    layer: Annotated[str | None, option("--layer PART:LAYER", "which layer; else the first, 1:1")] = None
-    compare: Annotated[bool, option("--compare", "tell also time, material, support and risky area printed in one part")] = False
+    layer: Annotated[str | None, option("--layer PART:LAYER", "which layer; 1:1 by default")] = None
+    compare: Annotated[bool, option("--compare", "also show time, material and support in one part")] = False
     force: options.Force = False
 
 
@@ -71,16 +71,12 @@ class EditRequest:
     model: Annotated[
         str | None, typer.Argument(metavar="[MODEL|PLAN]", show_default=False, help="a model file, demo:NAME, or a plan (.toml)")
     ] = None
-    port: Annotated[
-        int, option("--port N", "serve it on this port; else on any free one", min=0, max=65535, show_default=False)
-    ] = 0
+    port: Annotated[int, option("--port N", "port of the page; else any free one", min=0, max=65535, show_default=False)] = 0
     no_browser: options.NoBrowser = False
-    upload_mib: Annotated[int, option("--upload-mib N", "the largest file that is taken from a page", min=1, max=1024)] = (
-        UPLOAD_MIB
+    upload_mib: Annotated[int, option("--upload-mib N", "the largest file that a page may send", min=1, max=1024)] = UPLOAD_MIB
+    lan: Annotated[bool, option("--lan", "open it to devices of the local network as well, each paired by a code shown here")] = (
+        False
     )
-    lan: Annotated[
-        bool, option("--lan", "open it to devices of the local network, too, each paired by a code that is told here")
-    ] = False
     certificate: Annotated[Path | None, option("--certificate FILE", "PEM file: encrypts --lan, with --key")] = None
     key: Annotated[Path | None, option("--key FILE", "PEM file: the key of the certificate")] = None
     given: options.ProfileOptions
@@ -91,13 +87,11 @@ class BatchRequest:
     """Every model of a folder. do: decompose, export or estimate; out: folder for the table and the files."""
 
     folder: Annotated[Path, typer.Argument(metavar="FOLDER", show_default=False, help="folder of models")]
-    out: Annotated[Path, option("-o --out DIR", "folder for DO.csv, a row a model, and what is made")]
-    do: Annotated[str, option("--do decompose|export|estimate", "what to make of each; estimate: the row alone")] = "export"
-    scheduler: Annotated[str | None, option("--scheduler ADDRESS", "dask scheduler whose workers do it, as tcp://HOST:8786")] = (
-        None
-    )
-    processes: Annotated[int | None, option("--workers N", "processes here; else one a core", min=1, max=1024)] = None
-    retries: Annotated[int, option("--retries N", "how often a model that was killed is tried again", min=0, max=100)] = 2
+    out: Annotated[Path, option("-o --out DIR", "folder for the results and DO.csv, a row for each model")]
+    do: Annotated[str, option("--do decompose|export|estimate", "what to make of each; estimate: the table alone")] = "export"
+    scheduler: Annotated[str | None, option("--scheduler ADDRESS", "dask scheduler of the workers, as tcp://HOST:8786")] = None
+    processes: Annotated[int | None, option("--workers N", "processes here; else one per core", min=1, max=1024)] = None
+    retries: Annotated[int, option("--retries N", "how often a model whose process was killed is retried", min=0, max=100)] = 2
     limit_s: Annotated[float | None, option("--limit-s SECONDS", "a model that takes longer is given up", min=1.0)] = None
     search: options.SearchOptions
     given: options.ProfileOptions
@@ -118,10 +112,8 @@ class BatchRequest:
 class WatchOptions:
     """The page that follows and commands a print."""
 
-    watch: Annotated[bool, option("--watch", "open a page of this computer that follows and commands the print")] = False
-    watch_port: Annotated[
-        int | None, option("--watch-port N", "serve it on this port; else on any free one", min=0, max=65535)
-    ] = None
+    watch: Annotated[bool, option("--watch", "open a page that follows and controls the print")] = False
+    watch_port: Annotated[int | None, option("--watch-port N", "port of that page; else any free one", min=0, max=65535)] = None
     no_browser: options.NoBrowser = False
 
     @property
@@ -257,7 +249,7 @@ class CalibrationRequest:
     save: Annotated[str | None, option("--save NAME", "name of your profile; else the machine's")] = None
     replace: Replace = False
     force: Annotated[bool, option("--force", "save although touches or readings are far off")] = False
-    directions: Annotated[bool, option("--directions", "find the directions of the axes, too")] = False
+    directions: Annotated[bool, option("--directions", "also find the directions of the axes")] = False
     probing: ProbeOptions = ProbeOptions()
     given: MachineOptions = MachineOptions()
 

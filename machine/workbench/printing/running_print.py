@@ -10,7 +10,7 @@ from typing import Annotated
 from pydantic import Field
 
 from machine.crash import bug_in_words
-from machine.link.pending_commands import Command
+from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, Command
 from machine.link.print_state import PrintState, follows
 from machine.printing.destination import Server, Simulated
 from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
@@ -24,7 +24,8 @@ from profiles.errors import PrinterError, UserError
 MAIN = "from machine.workbench.printing.process import main; main()"
 EMERGENCY_S = 5.0  # so long the print's own process has to stop the printer: it tries for 2.5 s; then it is done without it
 LEAVE_S = 5.0  # so long a print that is not to go on has to let go of its port
-Percent = Annotated[int, Field(ge=0, le=10_000)]
+FeedPercent = Annotated[int, Field(ge=FEED_PERCENT[0], le=FEED_PERCENT[1])]
+FlowPercent = Annotated[int, Field(ge=FLOW_PERCENT[0], le=FLOW_PERCENT[1])]
 HandWord = Annotated[HandDoes, Field(strict=False)]  # a text in JSON
 DIED = "the process that printed has ended before the print was done"
 
@@ -122,11 +123,11 @@ class RunningPrint:
         """Go on after a pause."""
         self.say((Command.RESUME,))
 
-    def feed(self, *, percent: Percent) -> None:
+    def feed(self, *, percent: FeedPercent) -> None:
         """Set the speed, in per cent of the programmed one."""
         self.say((Command.FEED, float(percent)))
 
-    def flow(self, *, percent: Percent) -> None:
+    def flow(self, *, percent: FlowPercent) -> None:
         """Set the flow, in per cent of the programmed one."""
         self.say((Command.FLOW, float(percent)))
 

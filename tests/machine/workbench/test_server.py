@@ -151,14 +151,14 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
         page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
         bench.send(folder / "tee.stl")
         page.do("search", ranker="none")
-        assert "Ranked as none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
+        assert "Search ranking none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
         page.do("search", orient=False)
         as_it_lies = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
         assert not any("laid down" in note for note in as_it_lies["notes"])
         page.do("search", ranker="learned")
         laid = page.until(lambda state: state["rotation"] != as_it_lies["rotation"] and not state["search"])
         (told,) = (note for note in laid["notes"] if "laid down" in note)
-        assert told.startswith("it is laid down on its front (turned 90 about x): in one piece with 0 mm² of scars")
+        assert told.startswith("oriented on its front (turned 90 about x): in one piece with 0 mm² of visible marks")
         assert told.endswith("; Undo, then Find parts without Lay it down, too, keeps it as it stands")
         assert laid["front"][0]["support_area_mm2"] < as_it_lies["front"][0]["support_area_mm2"]
         assert bench.ask("plan.toml")[1] == (folder / "parts" / "plan.toml").read_bytes()
