@@ -42,7 +42,7 @@ CONTACT = (
     "contact: of the joint's section, what beads of the first layer cover and earlier parts reach up to; plastic: what that "
     "layer gets of what the room below its tip holds there"
 )
-BREAKS = "breaks: pushed sideways at the end of its arm, the farthest place of what it holds; an estimate of the cold weld alone"
+BREAKS = "breaks: the force sideways at the tip of the part; an estimate of the cold weld alone"
 RISKY = "risky: faces that would need support if the model were printed in one piece as it lies now; left: as the part is printed"
 
 
@@ -163,7 +163,12 @@ def _front(decomposition: Decomposition) -> list[Table]:
     notes = [f"chosen: {row.reason}" for row in front if row.chosen]
     notes.append("--parts takes another row; time and filament are estimates")
     return [
-        _table("In how many parts", ["parts", "support mm²", "seams mm", "stairs mm²", "costs mm²", "about", "m"], rows, notes)
+        _table(
+            "Number of parts",
+            ["parts", "needs support mm²", "seams mm", "stair-stepping mm²", "cost mm²", "time", "m"],
+            rows,
+            notes,
+        )
     ]
 
 

@@ -131,7 +131,7 @@ def test_parts_drawn_apart_tell_their_support_and_are_chosen_by_a_click(browser:
     force = browser.value("$('parts-list').querySelectorAll('tbody tr')[1].cells[5].textContent")
     assert force.endswith(" N")
     assert browser.value("$('joint-told').textContent").startswith("The joint of part 2, the weakest, has ")
-    assert f"breaks at about {force}, pushed sideways" in browser.value("$('joint-told').textContent")
+    assert f"breaks at about {force} sideways at its tip" in browser.value("$('joint-told').textContent")
     browser.click("[data-view=front]")
     drag_slider(browser, "apart", 1, "input")
     browser.click("#fit")

@@ -36,7 +36,7 @@ PHRASES = {
     "another plate": "choose another one below",
     "compiling": "getting ready (only the first run needs to)",
     "for all": "set it for all parts",
-    "force": "tick Go on all the same to print it anyway",
+    "force": "tick Go on anyway to print it",
     "found by the search": "leave the part out of the plan and use Find the others",
     "compiled": "getting ready: {} steps done",
     "hand over": "or tick Only hand the file over",

@@ -46,7 +46,7 @@ from profiles.errors import MoveError, PlanError
 from profiles.profile import Profile, load
 
 PLAN_NAME = "plan.toml"
-AS_IT_STANDS = "Undo, then Find parts without Lay it down, too, keeps it as it stands"  # the page's own words
+AS_IT_STANDS = "to keep the orientation: Undo, then Find parts without Also choose the best orientation"  # the page's own words
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # the same bytes every time
 UNTILTED = 1.0 - 1e-9  # cosine between two normals that are the same but for rounding
 _ready: tuple[int, Trials] | None = None  # of the bench that this process has heard of last

@@ -9,7 +9,7 @@ const orDash = (value, told) => (value === null ? "–" : told(value));
 const FRONT = [
   ["support mm²", (row) => Math.max(row.support_area_mm2, 0).toFixed(1)],
   ["seams mm", (row) => row.seam_mm.toFixed(0)],
-  ["stairs mm²", (row) => row.stairs_mm2.toFixed(0)],
+  ["stair-stepping mm²", (row) => row.stairs_mm2.toFixed(0)],
   ["about", (row) => orDash(row.time_s, roughly)],
   ["filament m", (row) => orDash(row.filament_mm, (length) => (length / 1000).toFixed(1))],
 ];

@@ -75,12 +75,12 @@ function tellRow(row) {
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [
     ["parts", `${row.parts}${byHand ? ", changed by hand since; this is how they were found" : best ? ` (recommended: ${row.why})` : ""}`], ["area to support", mm2(row.support_area_mm2)],
-    ["seams", `${row.seam_mm.toFixed(0)} mm`], ["stairs", mm2(row.stairs_mm2)], ["takes about", orDash(row.time_s, roughly)],
+    ["seams", `${row.seam_mm.toFixed(0)} mm`], ["stair-stepping", mm2(row.stairs_mm2)], ["takes about", orDash(row.time_s, roughly)],
     ["plastic", orDash(row.filament_mm, (long) => `${(long / 1000).toFixed(1)} m`)],
   ]);
 }
 
-const HEAD = ["part", "cm³", "support mm²", "rim mm", "edge", "joint", "lock"];
+const HEAD = ["part", "cm³", "support mm²", "seam mm", "edge", "joint", "lock"];
 const UNKNOWN = "–";
 const SIDES = ["right", "right and back", "back", "left and back", "left", "left and front", "front", "right and front"];
 

@@ -114,6 +114,6 @@ export function apartPanel(picture) {
 function jointInWords(joints, chosen) {
   const joint = joints.find(({ part }) => part === chosen) || joints.find(({ weakest }) => weakest);
   if (!joint) return "";
-  const force = `breaks at about ${newtons(joint.load_n)}, pushed sideways ${joint.arm_mm.toFixed(0)} mm away, or pulled off at ${newtons(joint.tension_n)}`;
+  const force = `breaks at about ${newtons(joint.load_n)} sideways at its tip, or ${newtons(joint.tension_n)} in tension`;
   return `The joint of part ${joint.part}${joint.weakest ? ", the weakest," : ""} has ${mm2(joint.area_mm2)}, a seam of ${joint.seam_mm.toFixed(0)} mm and ${force}.`;
 }
