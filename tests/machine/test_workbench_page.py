@@ -115,7 +115,7 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     browser.key("1")  # a view, not a step
     browser.click("#undo")
     browser.wait("$('front').value === $('front').max && !$('redo').disabled")
-    assert "laid down" not in browser.value("$('front-notes').textContent")
+    assert "oriented on" not in browser.value("$('front-notes').textContent")
     with bench.line() as second_page:
         second_page.do("set", key="search.seam_mm", value="100")  # too dear to be cut
         second_page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
