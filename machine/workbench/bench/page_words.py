@@ -45,7 +45,6 @@ PHRASES = {
     "its baud rate": "its baud rate",
     "machine of those": "choose one of these machines under Settings",
     "offset": "the offset is {} mm",
-    "thin": "{}",
     "protected": "protected area {}",
     "page": "{}",
     "one part": "choose 1 part",

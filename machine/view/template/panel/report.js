@@ -78,7 +78,7 @@ export function findingsOf(print, scene, bells, camera, player) {
   const { findings } = print.header, placed = findings.flatMap((finding, k) => (finding.row >= 0 && finding.workpiece_mm ? [k] : []));
   let chosen = -1;
   $("tab-findings").textContent = `Findings (${findings.length})`;
-  $("findings").append(made("h2", { text: findings.length ? "Findings" : "The dry run finds nothing to complain about" }));
+  $("findings").append(made("h2", { text: findings.length ? "Findings" : "The dry run found no problem" }));
   const items = findings.map((finding, k) => findingButton(finding, () => choose(k), { disabled: finding.row < 0 }));
   $("findings").append(...items);
   const choose = (k) => {
