@@ -77,7 +77,7 @@ def test_marks_are_in_the_plan_that_the_command_line_cuts_by_and_drive_planes_aw
         assert sum(byte == 2 for byte in bench.ask(f"marks/{state['marks']}")[1]) == 6  # the flat back of the T
         page.do("mark", kind="keep", min_mm=[-2, -2, 33], max_mm=[2, 2, 37])
         state = page.until(lambda state: state["problem"])
-        assert "a plane was taken away: its plane would pass through zone 1 of [[keep]]" in state["problem"]
+        assert "a plane was removed: its plane would pass through zone 1 of [[keep]]" in state["problem"]
         assert [cut["offset_mm"] for cut in state["cuts"]] == [20.0]
         page.do("lock", part=2, locked=True)
         page.do("mark", kind="keep", min_mm=[-2, -2, 19], max_mm=[2, 2, 21])

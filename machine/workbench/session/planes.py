@@ -227,4 +227,4 @@ def _removed_in_words(word: str, reasons: Sequence[str]) -> str:
     if not reasons:
         return ""
     planes = "a plane was" if len(reasons) == 1 else f"{len(reasons)} planes were"
-    return f"{word}: {planes} taken away: {'; '.join(dict.fromkeys(reasons))}"
+    return f"{word}: {planes} removed: {'; '.join(dict.fromkeys(reasons))}"

@@ -304,7 +304,7 @@ class Session(SessionBase):
         if bench.cuts is not None and effect >= Effect.REACH:
             trial = await self.trials.attempt(bench, bench.cuts)
             if trial.rejected:
-                why = f"{word}: the planes were taken away, for part {trial.rejected_part} cannot be cut off: {trial.rejected}"
+                why = f"{word}: the planes were removed, because part {trial.rejected_part} cannot be cut off: {trial.rejected}"
                 return replace(with_cuts(bench, ()), cuts=None), why
         return bench, ""
 

@@ -366,7 +366,7 @@ def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbi
         page.do("profile", kind="machine", name="three_axis")
         gone = page.until(lambda state: state["given"]["machine"] == "three_axis" and state["problem"])
         assert gone["parts"] == 0
-        assert "the planes were taken away, for part 2 cannot be cut off: " in gone["problem"]
+        assert "the planes were removed, because part 2 cannot be cut off: " in gone["problem"]
         page.do("undo")
         page.until(lambda state: state["parts"] == 2 and state["given"]["machine"] == "generic_ac")
         page.do("set", key="process.scale", value="2")

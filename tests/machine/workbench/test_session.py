@@ -336,7 +336,7 @@ def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_a
 
     cut: list[tuple[int, int, str]] = []
     session = when_done(work)
-    why = f"set {key_name('process.place_mm')}: the planes were taken away, for part 3 cannot be cut off: Z would go too far"
+    why = f"set {key_name('process.place_mm')}: the planes were removed, because part 3 cannot be cut off: Z would go too far"
     assert cut == [(3, 3, ""), (0, 2, why)]
     assert (session.bench.parts, session.bench.profile.process.place_mm) == (3, (30.0, 0.0))
 
