@@ -14,7 +14,7 @@ const kept = keptInTab("settings", { level: "simple", folded: [] });
 export function settingsPanel() {
   const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
   const explained = new Set();
-  let settings = [], missed = false, changedOnly = false; // missed: they have not come
+  let settings = [], missed = false, changedOnly = false, fetches = 0; // missed: they have not come
   const part = () => numberIn("settings-part") || 0;
   const set = (key, value, typed) => {
     const of = part();
@@ -63,10 +63,9 @@ export function settingsPanel() {
     list();
   };
   const fetchAll = async () => {
-    const asked = part(), answer = await fetch(`settings.json?part=${asked}`).catch(() => null);
-    missed = !answer; // the line is lost: the next state asks again
-    if (!answer?.ok || asked !== part()) return;
-    const told = await answer.json();
+    const number = ++fetches, told = await fetch(`settings.json?part=${part()}`).then((answer) => (answer.ok ? answer.json() : {}), () => null);
+    missed = !told; // the line is lost: the next state asks again
+    if (!told?.settings || number !== fetches) return; // a later question has the newer answer
     settings = told.settings;
     showProfiles(told.profiles);
     putNew($("command-line"), told.command, () => told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
@@ -152,10 +151,7 @@ function groupTitle(own, folded, turn) {
 
 /** A text into the clipboard, or marked for the person to take where the browser allows no more. */
 async function copyText(element, button) {
-  const range = document.createRange();
-  range.selectNodeContents(element);
-  getSelection().removeAllRanges();
-  getSelection().addRange(range);
+  getSelection().selectAllChildren(element);
   const copied = await navigator.clipboard?.writeText(element.textContent).then(() => true, () => false);
   button.textContent = copied ? "Copied" : "Selected: press Ctrl+C";
   setTimeout(() => { button.textContent = "Copy"; }, 3000);
