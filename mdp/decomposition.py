@@ -109,8 +109,9 @@ class Decomposition:
     the build plate.
 
     risky_area_mm2 is the area that needs support when the whole model is printed straight up, residual_area_mm2 the area that the
-    parts leave. folded_mm3 is how far the mesh's volume may differ from the parts' total, because its surface intersects itself.
-    uncut is each model as one part with its marks, centred about the turn axis; () if unknown, which means without marks.
+    parts leave. rejected says why a search that cut nothing has rejected its candidates. folded_mm3 is how far the mesh's volume
+    may differ from the parts' total, because its surface intersects itself. uncut is each model as one part with its marks,
+    centred about the turn axis; () if unknown, which means without marks.
     """
 
     name: str
@@ -124,6 +125,7 @@ class Decomposition:
     rounds: int
     search_s: float
     notes: tuple[str, ...] = ()
+    rejected: tuple[str, ...] = ()
     folded_mm3: float = 0.0
     front: tuple[FrontRow, ...] = ()
     uncut: tuple[Part, ...] = ()

@@ -118,7 +118,7 @@ class Table(Frozen):
 class Blocks(Frozen):
     """G-code blocks; {placeholders} are listed in docs/machines.md."""
 
-    start: Block = advanced("Start G-code", "custom script begin", effect=Effect.NONE)(
+    start: Block = advanced("Start G-code", "custom script begin chamber temperature", effect=Effect.NONE)(
         ..., "before the first part: homing, heating, priming"
     )
     end: Block = advanced("End G-code", "custom script finish", effect=Effect.NONE)(
@@ -127,7 +127,7 @@ class Blocks(Frozen):
     before_part: Block = advanced("G-code before a part", "custom script", effect=Effect.NONE)("", "before each reorientation")
     after_part: Block = advanced("G-code after a part", "custom script", effect=Effect.NONE)("", "after each part")
     before_layer: Block = advanced(
-        "G-code before a layer", "custom script layer change before_layer_gcode layer_gcode", effect=Effect.NONE
+        "G-code before a layer", "custom script layer change filament change before_layer_gcode layer_gcode", effect=Effect.NONE
     )(
         "",
         "before each layer, over the print: only commands that are known to move nothing and to change no mode; macros are "
@@ -176,7 +176,7 @@ class Machine(Frozen):
         60.0, "greatest speed of the filament, mm/s"
     )
     extruder_acceleration_mm_s2: float = advanced("Extruder acceleration", "E maximum", gt=0, le=100000, effect=Effect.PRICES)(
-        1500.0, "acceleration of the filament, mm/s2"
+        1500.0, "acceleration of the filament, mm/s²"
     )
     arcs: bool = advanced("Arcs", "arc fitting G2 G3 welder", effect=Effect.NONE)(
         False, "true: strokes along circles are written as arcs, G2 and G3; the firmware must know them"

@@ -26,7 +26,7 @@ def option(name: str, value: object = None) -> str:
 
 
 def advice(name: str, value: object, verb: str = "") -> str:
-    """An option that the user may give: "--parts 4", on the page "take 4 under In how many parts". verb: before it."""
+    """An option that the user may give: "--parts 4", on the page "choose 4 parts". verb: before it."""
     return _mark(f"advice --{name}", f"{value}", f"{verb} {_written(name, value)}" if verb else _written(name, value))
 
 

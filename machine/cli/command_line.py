@@ -9,13 +9,14 @@ import typer
 
 from machine.cli.terminal import options, requests
 from machine.cli.terminal.options import option, with_option_groups
-from machine.pipeline.requests import BAUD, Outputs
+from machine.notices import say
+from machine.pipeline.requests import BAUD, SIMULATED, Outputs
 
 
 def decompose(
     model: options.Model, search: options.FileOptions, asked: requests.DecomposeOptions, given: options.ProfileOptions
 ) -> int:
-    """Cut a model into parts, each with its own printing direction."""
+    """Cut a model into parts, each with its own printing direction. It writes no G-code: export does, from the same options."""
     options.check_model(model)
     from machine.cli.commands.decompose import decompose
 
@@ -24,17 +25,25 @@ def decompose(
 
 def export(
     models: options.Models,
-    out: Annotated[Path, option("-o --out OUT.gcode", "G-code file to write; - for standard output")],
     program: options.ProgramOptions,
     asked: requests.ExportOptions,
     given: options.ProfileOptions,
+    out: Annotated[
+        Path | None, option("-o --out OUT.gcode", "G-code file to write, - for standard output; else MODEL.gcode, here")
+    ] = None,
 ) -> int:
-    """Write the G-code of one or several models, dry-run first."""
+    """Write the G-code of one or several models. A dry run checks it first."""
     for model in dict.fromkeys(options.named_models(models)):
         options.check_model(model)
-    from machine.cli.commands.export import export
+    from machine.cli.commands.export import default_gcode, export
 
-    outputs = Outputs(gcode=out, json=asked.json, html=asked.html, svg=asked.svg, layer=asked.layer)
+    outputs = Outputs(
+        gcode=out or default_gcode(options.named_models(models)[0]),
+        json=asked.json,
+        html=asked.html,
+        svg=asked.svg,
+        layer=asked.layer,
+    )
     return export(options.program_request(models, program, given, outputs=outputs, compare=asked.compare, force=asked.force))
 
 
@@ -48,7 +57,7 @@ def simulate(
     *,
     given: options.ProfileOptions,
 ) -> int:
-    """Dry-run a model or a G-code file. Compares the plastic with the model; exit code 1 if there is an error."""
+    """Check a model or a G-code file by a dry run. It compares the plastic with the model; exit 1 if a finding is an error."""
     from machine.cli.commands.simulate import simulate
 
     return simulate(options.program_request(models, program, given, outputs=Outputs(json=json, html=html)), reference, baud)
@@ -65,14 +74,14 @@ def view(
     compare: Annotated[bool, option("--compare", "also report time and material of a print in one part")] = False,
     given: options.ProfileOptions,
 ) -> int:
-    """Write an HTML page that shows a model or a G-code file. It has parts, layers, the moving machine and a report."""
+    """Write an HTML page of a model or a G-code file. It shows the parts, the layers, the moving machine and a report."""
     from machine.cli.commands.view import view
 
     return view(options.program_request(models, program, given, outputs=Outputs(html=out), compare=compare), open_)
 
 
 def edit(asked: requests.EditRequest) -> int:
-    """Open the workbench, a page to cut, slice and print. Only this computer reaches it without --lan; Ctrl-C ends it."""
+    """Open the workbench, a page to cut, slice and print. Only this computer can open it, unless --lan; Ctrl-C ends it."""
     from machine.cli.commands.edit import edit
 
     return edit(asked)
@@ -84,7 +93,7 @@ def save(
     out: Annotated[Path, option("-o --out NAME.3mf", "project file to write")],
     given: options.ProfileOptions,
 ) -> int:
-    """Write a project: one 3MF file with model, plan and profiles. Every command reads it, and other slicers open it."""
+    """Write a project: one 3MF with model, plan and profiles. Every command accepts it, and other slicers open it."""
     options.check_model(model)
     from machine.cli.commands.export import save
 
@@ -92,7 +101,7 @@ def save(
 
 
 def batch(asked: requests.BatchRequest) -> int:
-    """Export all models of a folder, on all cores or many machines. Or decompose or estimate them; a repeated run continues."""
+    """Export, decompose or estimate every model of a folder. A second run continues the first."""
     from machine.cli.commands.batch import batch
 
     return batch(asked)
@@ -100,20 +109,23 @@ def batch(asked: requests.BatchRequest) -> int:
 
 def print_(
     models: options.ModelsOrGcode,
-    port: options.PortOrSim,
     program: options.ProgramOptions,
     asked: requests.PrintOptions,
     given: options.ProfileOptions,
+    port: Annotated[str | None, option("--port PORT|sim", "serial port or print server; else sim, the simulated printer")] = None,
 ) -> int:
     """Print models or a G-code file on a printer or a simulated one.
 
-    PORT is a device (see ports), socket://HOST:PORT or rfc2217://HOST:PORT, or a print server: octoprint:HOST, moonraker:HOST,
-    duet:HOST, to which the program is handed over first. The printer is asked who it is before anything moves.
-    Keys at a terminal: p pauses, r resumes, c cancels, + - feed, [ ] flow, u d Z offset, e e emergency stop; Ctrl-C cancels.
+    Without --port it is the simulated one. PORT is a device (the command ports lists them), socket://HOST:PORT,
+    rfc2217://HOST:PORT, or a print server, which gets the program first: octoprint:HOST, moonraker:HOST or duet:HOST. The
+    printer is identified before anything moves or heats.
+    Keys at a terminal: p pause, r resume, c cancel, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
     """
     from machine.cli.commands.print import print_model
 
-    return print_model(options.program_request(models, program, given, force=asked.force), port, asked)
+    if port is None:
+        say("no --port is given, so the simulated printer prints; tiltprint ports lists real ones")
+    return print_model(options.program_request(models, program, given, force=asked.force), port or SIMULATED, asked)
 
 
 def send(

@@ -20,6 +20,7 @@ from machine.planning.limits import axis_limits
 from mdp.kernels.threads import ahead
 from mdp.mesh import Floats
 from profiles.errors import GcodeError
+from profiles.messages import terminal_words
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -219,5 +220,5 @@ def summary(run: DryRun) -> dict[str, Any]:
             }
             for face in run.interfaces
         ],
-        "findings": [asdict(finding) for finding in run.findings],
+        "findings": [asdict(finding) | {"message": terminal_words(finding.message)} for finding in run.findings],
     }

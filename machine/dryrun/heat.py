@@ -11,7 +11,9 @@ from machine.gcode.line_text import to_ascii
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram, fan_shares, pieces, temperatures
 from machine.gcode.words import quote
 from mdp.mesh import Floats
+from profiles.errors import counted
 from profiles.machine import Machine
+from profiles.messages import key_name
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -192,8 +194,9 @@ def _profile(program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
     machine = profile.machine
     if machine.uncalibrated:
         count = len(machine.uncalibrated)
-        which = f"{count} numbers of {machine.name} are" if count > 1 else f"one number of {machine.name} is"
-        message = f"{which} in no source, measure them (docs/calibration.md): {', '.join(machine.uncalibrated)}"
+        which = counted(count, "value is a guess", "values are guesses")
+        names = ", ".join(map(key_name, machine.uncalibrated))
+        message = f"{machine.name} is not calibrated: {which} (see docs/calibration.md): {names}"
         yield Finding("warning", "uncalibrated", 0, 0, 0, message)
     for line, part, area in program.unsupported:
         where = f", most of them in layer {area.layer}" if area.layer else ""

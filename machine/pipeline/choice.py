@@ -21,8 +21,8 @@ from profiles.profile import Profile
 from slicer.estimate.estimate import estimate
 
 HARDLY_HELD = (
-    f"its base may be too small to hold it: think of a wide brim ({key_name('process.brim_mm')}) or another "
-    f"side ({key_name('process.rotate_deg')})"
+    f"its base may be too small to hold it: consider a wide brim ({key_name('process.brim_mm')}) or another "
+    f"orientation ({key_name('process.rotate_deg')})"
 )
 
 
@@ -69,9 +69,10 @@ def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
     side, turns = side_in_words(orientation), in_words(orientation, held=True)
     where, better = f"{side} ({turns})" if side else turns, ""
     if laid is not None:
-        was = f"{oriented.upright.risky_mm2:.0f} mm² hang over" if standing is None else _with_blemishes(standing)
-        better = f": {_with_blemishes(laid)}, as it stands {was if oriented.upright_held else 'the plate would hardly hold it'}"
-    return (f"it is placed {where}{better}; {otherwise}", *warning)
+        was = f"{oriented.upright.risky_mm2:.0f} mm² would need support" if standing is None else _with_marks(standing)
+        upright = was if oriented.upright_held else "it would hardly hold on the plate"
+        better = f": {_with_marks(laid)}, standing as in its file {upright}"
+    return (f"oriented {where}{better}; {otherwise}", *warning)
 
 
 def standing_in_words(mesh: Mesh, profile: Profile) -> tuple[str, ...]:
@@ -79,9 +80,9 @@ def standing_in_words(mesh: Mesh, profile: Profile) -> tuple[str, ...]:
     return () if BuildPlate.under(mesh, profile).footing(np.eye(3)).held(of_file=True) else (HARDLY_HELD,)
 
 
-def _with_blemishes(row: FrontRow) -> str:
+def _with_marks(row: FrontRow) -> str:
     taking = "" if row.time_s is None else f" in {minutes(row.time_s)}"
-    return f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm² of blemishes{taking}"
+    return f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm² of visible marks{taking}"
 
 
 def in_parts(count: int) -> str:

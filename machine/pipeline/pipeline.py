@@ -129,7 +129,7 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     if record_file is not None:
         write_bytes(record_file, next(record[0] for searched, record in records if searched is decomposition))
     check_parts_named(profile, len(decomposition.parts))
-    for note in (*decomposition.notes, *notes):
+    for note in (*decomposition.notes, *(decomposition.rejected if request.verbose else ()), *notes):
         say(f"{request.name}: {note}")
     plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation, profile.parts)
     return Decomposed(decomposition, as_turned(profile, orientation), plan, read_s, perf_counter() - began)
@@ -154,8 +154,7 @@ def _search(
         if stage == 0:
             compilers.wait_for(compilers.SEARCH, report)
             return
-        left = f"{100 * best_share:.1f} % of the risky area left"
-        report(f"searching parts: stage {stage}, {beam} in the beam, {left}")
+        report(f"searching parts: stage {stage}, cost down to {100 * best_share:.0f} %")
 
     record: list[bytes] = []
     on_record = None if request.outputs.record is None else record.append

@@ -98,11 +98,11 @@ def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person:
         record = printer.record
     if outcome.cancelled:
         return report_end(outcome, scene.log)
-    segments, volumes = record.deposited(loaded.profile.material.diameter_mm)
+    _, volumes = record.deposited(loaded.profile.material.diameter_mm)
     planned = float(loaded.program.run.segment_mm3.sum())
-    laid = f"{len(segments)} strokes laid {volumes.sum() / 1000:.3f} cm3 (planned {planned / 1000:.3f})"
-    heaters = f"heaters at {record.nozzle_target_c:g} and {record.bed_target_c:g} °C at the end"
-    moves = f"{len(record.start)} moves in {duration(float(record.duration_s.sum()))}"
+    laid = f"{volumes.sum() / 1000:.3f} cm³ of plastic laid (planned {planned / 1000:.3f})"
+    heaters = "heaters off" if record.nozzle_target_c == record.bed_target_c == 0.0 else "heaters still on"
+    moves = f"{len(record.start)} moves in {duration(float(record.duration_s.sum()))} of printing time"
     show(f"simulated printer: {moves}, {laid}, {heaters}\n")
     if record.clamped or record.unknown:
         raise PrinterError(

@@ -41,7 +41,7 @@ CONTACT = (
     "contact: share of the joint's section that is covered by beads of the first layer and supported by earlier parts; plastic: "
     "volume of these beads as a share of the room below the nozzle"
 )
-BREAKS = "breaks: force sideways at the end of the arm, the farthest point that it holds; an estimate of the cold weld alone"
+BREAKS = "breaks: force sideways at the tip of the part, the farthest point that it holds; an estimate of the cold weld alone"
 RISKY = "risky: faces that would need support in one piece in the present orientation; left: as the part is printed"
 
 
@@ -158,11 +158,16 @@ def _front(decomposition: Decomposition) -> list[Table]:
         time = "–" if row.time_s is None else duration(row.time_s)
         filament = "–" if row.filament_mm is None else f"{row.filament_mm / 1000:.1f}"
         areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", f"{row.cost_mm2:.1f}"]
-        rows.append([f"{row.parts}{' (taken)' * row.chosen}", *areas, time, filament])
-    notes = [f"taken: {row.reason}" for row in front if row.chosen]
+        rows.append([f"{row.parts}{' (chosen)' * row.chosen}", *areas, time, filament])
+    notes = [f"chosen: {row.reason}" for row in front if row.chosen]
     notes.append("--parts selects another row; time and filament are estimates")
     return [
-        _table("In how many parts", ["parts", "support mm²", "seams mm", "stairs mm²", "costs mm²", "about", "m"], rows, notes)
+        _table(
+            "Number of parts",
+            ["parts", "needs support mm²", "seams mm", "stair-stepping mm²", "cost mm²", "time", "m"],
+            rows,
+            notes,
+        )
     ]
 
 

@@ -19,6 +19,7 @@ from mdp.pose import unit
 from mdp.save import joint_values, plane_values
 from profiles.axes import RotaryAxis
 from profiles.machine import Machine
+from profiles.messages import terminal_words
 from profiles.profile import Profile
 
 RESIDUAL, UPRIGHT = 1, 2  # bits of face_marks
@@ -123,8 +124,8 @@ def finding_records(run: DryRun, machine: Machine, known: bool, shown: NDArray[n
             points = {"workpiece_mm": workpiece_path(machine, at)[0].tolist(), "machine_mm": at[0, :3].tolist()}
         records.append(
             {
-                "severity": finding.severity, "code": finding.code, "message": finding.message, "line": finding.line,
-                "part": finding.part, "layer": finding.layer, "row": shown_row,
+                "severity": finding.severity, "code": finding.code, "message": terminal_words(finding.message),
+                "line": finding.line, "part": finding.part, "layer": finding.layer, "row": shown_row,
             } | points
         )  # fmt: skip
     return records

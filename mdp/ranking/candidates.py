@@ -48,8 +48,8 @@ class Reason(IntEnum):
 
 
 REASONS = {
-    Reason.PLATFORM: f"the plane would cut the build plate{phrase('', ' (criterion III)')}",
-    Reason.FLOATING: f"the remainder would not stand on the build plate{phrase('', ' (criterion II)')}",
+    Reason.PLATFORM: "it would cut into the build plate",
+    Reason.FLOATING: "the remainder would not stand on the build plate",
     Reason.REACH: "the axes do not reach the direction",
     Reason.CLEARANCE: "the head would meet the table",
     Reason.VOLUME: f"the part would be too small ({key_name('search.least_volume_share')})",

@@ -265,10 +265,9 @@ def _reason_text(problem: Problem, node: Node, plane: Plane, limits: Bounds, rea
     text = REASONS[reason]
     match reason:
         case Reason.PLATFORM:
-            least_mm = limits.least_offset_mm[0]
-            least, offset = f"{least_mm:.2f}", f"{plane.offset_mm:.6g}"
-            bounds = phrase("least offset", f"offset_mm must be at least {least}, it is {offset}", f"{least} mm, it is {offset}")
-            text += f": along its normal {bounds}"
+            least, offset = f"{ceil(10.0 * limits.least_offset_mm[0]) / 10.0:g}", f"{plane.offset_mm:.3g}"
+            by_file = f"offset_mm must be at least {least} (now {offset})"
+            text += f"; {phrase('page', by_file, f'move it to {least} mm or more (now {offset})')}"
         case Reason.REACH:
             text += f" of its normal on {problem.machine.name}"
         case Reason.CLEARANCE:

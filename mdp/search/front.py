@@ -18,9 +18,9 @@ from profiles.profile import Profile
 # seams.
 EQUAL = 0.01
 
-ASKED, BY_PLAN = "asked for", "by the plan"
-LEAST_PARTS = "the fewest parts, cost alike to the least"
-PRINTABLE = "the least cost of what can be printed well"
+ASKED, BY_PLAN = "chosen by you", "cut by the plan"
+LEAST_PARTS = "the fewest parts at about the lowest cost"
+PRINTABLE = "the lowest cost that prints well"
 Price = tuple[float, float]  # printing time of the parts, s, and filament, mm
 Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be printed
 
@@ -170,13 +170,13 @@ def choose(rows: Sequence[FrontRow], weights: Weights, least_saving: float = 0.0
         taken = min(places, key=lambda place: totals[place] + charge * (rows[place].parts - rows[first].parts))
     least_mm2 = min(row.cost_mm2 for row in rows)
     if rows[taken].cost_mm2 <= least_mm2:
-        reason = "the least cost"
+        reason = "the lowest cost"
     elif taken == scars:
         reason = LEAST_PARTS if min(rows[place].cost_mm2 for place in places) <= least_mm2 else PRINTABLE
     elif totals[taken] <= min(totals.values()):
-        reason = "the least cost with its time"
+        reason = "the lowest cost, time included"
     else:
-        reason = f"more parts would save less than {100.0 * least_saving:g} % each"
+        reason = f"each further part would save less than {100.0 * least_saving:g} %"
     return Choice(taken, reason, _savings_notes(rows[scars], rows[taken]) if taken != scars else ())
 
 
@@ -192,4 +192,4 @@ def _savings_notes(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
         price = f"but take {longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f"but take {longer_s:.0f} s longer"
     elif more_mm >= 50.0:
         price = f"but take {more_mm / 1000.0:.1f} m more filament"
-    return (f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm² of blemishes {price}: {advice('parts', parts)}",)
+    return (f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm² of visible marks {price}: {advice('parts', parts)}",)

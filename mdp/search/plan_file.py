@@ -101,7 +101,7 @@ def plan_of(
     parts = []
     for part in decomposition.parts[1:]:
         pose = f"tilt {part.pose.tilt_deg:.2f} and turn {part.pose.turn_deg:.2f} deg"
-        parts.append(PlannedPart.of(part.base, f"part {part.index}: {part.volume_mm3 / 1000:.2f} cm3, printed at {pose}"))
+        parts.append(PlannedPart.of(part.base, f"part {part.index}: {part.volume_mm3 / 1000:.2f} cm³, printed at {pose}"))
     turned = None if orientation is None else tuple(_vector(row) for row in orientation)
     sha = mesh_sha256(decomposition.mesh)
     return PlanFile("plan.toml", decomposition.name, sha, turned, tuple(parts), zones, decomposition.front, tuple(settings))

@@ -18,7 +18,7 @@ from mdp.joint import is_sound
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
-from mdp.ranking.candidates import REASONS
+from mdp.ranking.candidates import REASONS, Reason
 from mdp.ranking.node import Node
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.ranking.record import Trace
@@ -139,7 +139,9 @@ def _search(problem: Problem, name: str, request: SearchRequest, began: float) -
     parts, rows, notes = _take(problem, front, best, request)
     notes = (*_notes(problem, len(parts), len(rows), request), *notes)
     found = decomposition_of(problem, name, parts, rows, notes)
-    return replace(found, ranker=request.ranker, rounds=rounds, search_s=perf_counter() - began)
+    counts = problem.count_rejected() if len(parts) == len(rows) == 1 else {}
+    rejected = tuple(f"{counts[why]} candidates: {text}" for why, text in REASONS.items() if counts.get(why))
+    return replace(found, ranker=request.ranker, rounds=rounds, search_s=perf_counter() - began, rejected=rejected)
 
 
 def _take(
@@ -163,7 +165,7 @@ def _take(
     elif problem.terms.seam_mm <= 0.0:
         # this node, or its equal in cost
         place = next(place for place, node in enumerate(nodes) if len(node.cuts) == len(best.cuts))
-        choice = Choice(place, "the least risky area")
+        choice = Choice(place, "the least area that needs support")
     node, row = nodes[choice.place], rows[choice.place]
     parts = paying.get(choice.place) or make_parts(problem, node)
     if price is not None and row.time_s is None:
@@ -266,8 +268,7 @@ def _notes(problem: Problem, parts: int, rows: int, request: SearchRequest) -> l
         notes += _fewer_parts(request.parts, parts, "the search found")
     else:
         counts = problem.count_rejected()
-        shares = [f"{counts[why]} because {text}" for why, text in REASONS.items() if counts[why] > 0]
-        notes.append(f"no feasible cut among {sum(counts.values())} candidates: {'; '.join(shares)}")
+        notes.append("no cut is worth its seam" if counts[Reason.GAIN] else "no cut is possible: every plane was rejected")
     if zones.no_seam.anywhere and problem.terms.seam_mm <= 0.0:
         notes.append(
             f"[[no_seam]] has no effect on cuts, since seams cost nothing ({key_name('search.objective')}, "

@@ -69,7 +69,9 @@ class Layers(Frozen):
 class Shell(Frozen):
     """Walls, seams and skins."""
 
-    walls: int = simple("Walls", "perimeters shells wall loops wall count", ge=0, le=50)(3, "number of walls")
+    walls: int = simple("Walls", "perimeters shells wall loops wall count generator arachne classic", ge=0, le=50)(
+        3, "number of walls"
+    )
     overhang_extra_walls: int = advanced("Extra walls over overhangs", "extra perimeters if needed", ge=0, le=20)(
         0, "more walls in layers with overhanging walls: the outer ones hang on the inner ones"
     )
@@ -123,10 +125,10 @@ class Shell(Frozen):
         "places of sparse infill smaller than this become solid: thin limbs gain strength, and travels cost more than the "
         "plastic saved, mm²",
     )
-    gap_least_mm: float = advanced("Shortest gap fill", "filter out tiny gaps gap fill enabled", ge=0, le=1000)(
-        0.0, "gap fill shorter than this is left out, which saves travels; 1000 leaves out all gap fill, mm"
-    )
-    fuzzy_skin: Literal["none", "external", "all", "allwalls"] = simple("Fuzzy skin", "rough walls texture")(
+    gap_least_mm: float = advanced(
+        "Shortest gap fill", "filter out tiny gaps gap fill enabled arachne wall generator", ge=0, le=1000
+    )(0.0, "gap fill shorter than this is left out, which saves travels; 1000 leaves out all gap fill, mm")
+    fuzzy_skin: Literal["none", "external", "all", "allwalls"] = simple("Fuzzy skin", "rough walls texture fuzzy_skin")(
         "none",
         "which walls are roughened; external: outer walls on the outside; all: those of holes, too; allwalls: inner walls as "
         "well. First layers, faces at cuts, single lines and the climbing wall of spiral_vase stay even",
@@ -161,7 +163,7 @@ class Finish(Frozen):
         "true: above the bottom one wall climbs round without a seam, without inside, top or support; the model is in one part, "
         "its layers one area without holes; a narrow tip at the top is left out",
     )
-    ironing: bool = simple("Ironing", "smooth top surface")(
+    ironing: bool = simple("Ironing", "smooth top surface iron")(
         False, "true: the nozzle goes over uppermost skins once more, in dense lines; never where another part comes"
     )
     ironing_flow: float = advanced("Ironing flow", ge=0, le=1)(

@@ -71,7 +71,7 @@ class Motion(Frozen):
     retract_travel_mm: float = advanced(
         "Retract on travels longer than", "retraction minimum travel after retraction stringing", ge=0, le=100
     )(1.5, "shortest travel that is worth a retraction, mm")
-    combing: bool = advanced("Travel inside the part", "avoid crossing perimeters walls combing stringing")(
+    combing: bool = advanced("Travel inside the part", "avoid dont don't cross crossing perimeters walls combing stringing")(
         True, "true: travels go round through the inside of the layer where that avoids a retraction"
     )
     combing_detour_mm: float = advanced(
@@ -81,22 +81,22 @@ class Motion(Frozen):
         0.2, "lift along the nozzle for travels that retract, mm; a layer's height clears what has curled up"
     )
     acceleration_mm_s2: float | None = advanced("Acceleration", "default acceleration", gt=0, le=100000)(
-        None, "acceleration of every stroke; absent: what the axes allow, mm/s2"
+        None, "acceleration of every stroke; absent: what the axes allow, mm/s²"
     )
     outer_wall_acceleration_mm_s2: float | None = advanced("Outer wall acceleration", "external perimeters", gt=0, le=100000)(
-        None, "acceleration of outer walls; absent: acceleration_mm_s2, mm/s2"
+        None, "acceleration of outer walls; absent: acceleration_mm_s2, mm/s²"
     )
     infill_acceleration_mm_s2: float | None = advanced("Infill acceleration", "sparse infill supports", gt=0, le=100000)(
-        None, "acceleration of sparse infill and support; absent: acceleration_mm_s2, mm/s2"
+        None, "acceleration of sparse infill and support; absent: acceleration_mm_s2, mm/s²"
     )
     bridge_acceleration_mm_s2: float | None = advanced("Bridge acceleration", "bridging overhangs", gt=0, le=100000)(
-        None, "acceleration of bridges and overhanging walls; absent: acceleration_mm_s2, mm/s2"
+        None, "acceleration of bridges and overhanging walls; absent: acceleration_mm_s2, mm/s²"
     )
     first_layer_acceleration_mm_s2: float | None = advanced("First layer acceleration", "initial layer", gt=0, le=100000)(
-        None, "acceleration of the first layer on the plate; absent: acceleration_mm_s2, mm/s2"
+        None, "acceleration of the first layer on the plate; absent: acceleration_mm_s2, mm/s²"
     )
     travel_acceleration_mm_s2: float | None = advanced("Travel acceleration", "non-print moves", gt=0, le=100000)(
-        None, "acceleration of travels; absent: acceleration_mm_s2, mm/s2"
+        None, "acceleration of travels; absent: acceleration_mm_s2, mm/s²"
     )
     least_layer_time_s: float = advanced("Least layer time", "minimum layer time slow down cooling", ge=0, le=600)(
         5.0, "layers printed faster than this are slowed down, s"

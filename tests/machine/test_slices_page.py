@@ -215,7 +215,7 @@ def test_errors_of_the_slices_refuse_a_print_at_once_and_stale_slices_cannot_be_
     browser.wait("!$('print-problem').hidden && !$('force-line').hidden")
     problem = browser.value("$('print-problem').textContent")
     assert problem.startswith("the dry run found 2 errors, the first: ")
-    assert problem.endswith("(tick Go on all the same to print it nevertheless)")
+    assert problem.endswith("(tick Go on anyway to print it)")
     assert browser.value("$('run').hidden")  # nobody has been asked who is there
     browser.click("#undo")
     browser.wait("$('check').disabled && $('force-line').hidden && $('print-problem').hidden")

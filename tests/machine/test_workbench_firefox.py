@@ -133,7 +133,7 @@ def test_firefox_changes_settings_of_all_parts_and_of_one(firefox: Firefox) -> N
     put(firefox, "$('settings-part')", 2)
     firefox.wait("!document.querySelector('[data-key=\"process.walls\"].changed')")
     put_setting(firefox, "process.walls", 2)
-    assert firefox.value("$('settings-part').selectedOptions[0].text") == "part 2 (1 of its own)"
+    assert firefox.value("$('settings-part').selectedOptions[0].text") == "part 2 (1 changed)"
     put(firefox, "$('settings-part')", 0)
     assert "--set process.walls=1" in firefox.value("$('command-line').textContent")
     put_setting(firefox, "machine.gcode.before_part", "M104 S120")

@@ -115,14 +115,14 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     browser.key("1")  # a view, not a step
     browser.click("#undo")
     browser.wait("$('front').value === $('front').max && !$('redo').disabled")
-    assert "it is placed" not in browser.value("$('front-notes').textContent")
+    assert "oriented on" not in browser.value("$('front-notes').textContent")
     with bench.line() as second_page:
         second_page.do("set", key="search.seam_mm", value="100")  # too dear to be cut
         second_page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
     browser.click("#orient")
     browser.value("$('ranker').value = 'learned'")
     browser.click("#find")
-    browser.wait("$('front-notes').textContent.includes('it is placed on its front (turned 90 about x): in one piece')")
+    browser.wait("$('front-notes').textContent.includes('oriented on its front (turned 90 about x): in one piece')")
     assert browser.value("$('laid').textContent") == "as it stoodas it lies now"
     browser.wait(f"{SHARES_DRAWN}.every((share) => share > 0.05 && share < 0.9)")  # of both small pictures
     browser.click("#undo")

@@ -53,7 +53,7 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     browser.wait("!document.querySelector('[data-key=\"machine.tilt.limits_deg\"]')")
     put(browser, "process.walls", 5)
     browser.wait(changed("process.walls"))
-    assert browser.value("$('settings-part').selectedOptions[0].text") == "part 1 (1 of its own)"
+    assert browser.value("$('settings-part').selectedOptions[0].text") == "part 1 (1 changed)"
     command_line = browser.value("$('command-line').textContent")
     assert (
         "--set 'machine.tilt.limits_deg=[-45, 45]' --set process.top_layers=7 --parts 1 --as-is --part 1:walls=5"
@@ -101,7 +101,7 @@ def test_settings_are_found_by_other_slicers_words_and_taken_back_by_the_profile
     shown = browser.value(keys)
     assert {"process.walls", "material.nozzle_c"} <= set(shown)
     assert "process.bottom_layers" not in shown
-    assert browser.value("document.querySelector('[data-key=\"process.walls\"] .was').textContent") == "The profile has 3"
+    assert browser.value("document.querySelector('[data-key=\"process.walls\"] .was').textContent") == "Profile value: 3"
     browser.click("#reset-material")
     browser.wait(f"{keys}.includes('process.walls') && !{keys}.includes('material.nozzle_c')")
     assert browser.value("$('reset-material').hidden")

@@ -69,6 +69,15 @@ def test_a_unit_is_that_of_the_name(key: str, unit: str) -> None:
         ("linear advance", "material.pressure_advance"),
         ("heatbed", "material.bed_c"),
         ("cost", "material.price_per_kg"),
+        ("fuzzy skin", "process.fuzzy_skin"),
+        ("arachne", "process.walls"),
+        ("wall generator", "process.gap_least_mm"),
+        ("dont", "process.combing"),
+        ("filament change", "machine.gcode.before_layer"),
+        ("chamber", "machine.gcode.start"),
+        ("elefant first", "process.elephant_foot_mm"),
+        ("ironing", "process.ironing"),
+        ("z seam", "process.seam"),
     ],
 )
 def test_the_words_of_other_slicers_find_a_key(word: str, key: str) -> None:

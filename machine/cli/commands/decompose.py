@@ -3,7 +3,15 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from machine.cli.terminal.report import compare_table, estimates, joints_table, part_settings_lines, parts_table, table
+from machine.cli.terminal.report import (
+    compare_table,
+    estimates,
+    joints_table,
+    part_settings_lines,
+    parts_table,
+    table,
+    written_line,
+)
 from machine.notices import show
 from machine.pipeline import compilers
 from machine.pipeline.choice import in_parts
@@ -46,10 +54,23 @@ def decompose(request: ModelRequest) -> int:
     if outputs.json is not None:
         write_json(outputs.json, figures)
     if outputs.json != STDOUT:
-        tables = parts_table(decomposition, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
+        search, angle_deg = profile.search, profile.process.self_supporting_angle_deg
+        tables = parts_table(decomposition, angle_deg, search.count_platform_faces, request.verbose)
         comparison = compare_table(alternatives) if alternatives else ""
-        show(tables + joints_table(joints) + part_settings_lines(profile) + advice(decomposition, profile) + comparison)
+        written = [outputs.folder, *(file for file in outputs.files.values() if file is not None)]
+        ending = written_line(written, _verdict(request, decomposition)) if any(written) else ""
+        show(tables + joints_table(joints) + part_settings_lines(profile) + advice(decomposition, profile) + comparison + ending)
     return 0
+
+
+def _verdict(request: ModelRequest, decomposition: Decomposition) -> str:
+    """What the parts leave to support, and the command that goes on from here."""
+    plan = request.outputs.plan or request.plan or (request.outputs.folder and request.outputs.folder / PLAN)
+    by_plan = f" --plan {plan}" if plan else ""
+    return (
+        f"{in_parts(len(decomposition.parts))}, {decomposition.residual_area_mm2:.0f} mm² need support; "
+        f"tiltprint export {request.model}{by_plan} makes the G-code"
+    )
 
 
 def _is_same(file: Path, plan: Path | None) -> bool:
@@ -78,7 +99,7 @@ def advice(decomposition: Decomposition, profile: Profile) -> str:
     best = f"print it {in_parts(advised.parts if advised else len(decomposition.parts))}"
     if advised is not None and not advised.chosen:
         best += f": --parts {advised.parts}"
-    return _ways_table(ways) + f"advice: {best}\n"
+    return _ways_table(ways) + f"best: {best}\n"
 
 
 def _advised(decomposition: Decomposition, profile: Profile) -> FrontRow | None:
@@ -101,11 +122,10 @@ def _without_front(decomposition: Decomposition) -> list[FrontRow]:
 def _ways_table(ways: Sequence[tuple[str, FrontRow]]) -> str:
     """Table with support area, saving against the first row, seams, stair-stepping, time and filament of each way."""
     first_mm2 = ways[0][1].support_area_mm2
-    rows = [["print it", "support mm²", "less", "seams mm", "stairs mm²", "about", "filament m"]]
+    rows = [["print it", "needs support mm²", "less", "seams mm", "stair-stepping mm²", "cost mm²", "time", "filament m"]]
     for number, (name, row) in enumerate(ways):
         less = 1.0 - row.support_area_mm2 / first_mm2 if first_mm2 > 0.0 else 0.0
         share = f"{round(100 * less, 1) + 0.0:.1f} %" if number else ""
-        rows.append(
-            [name, f"{max(row.support_area_mm2, 0.0):.1f}", share, f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", *estimates(row)]
-        )
+        areas = [f"{max(row.support_area_mm2, 0.0):.1f}", share, f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}"]
+        rows.append([name, *areas, f"{row.cost_mm2:.1f}", *estimates(row)])
     return table(rows)

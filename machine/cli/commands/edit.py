@@ -41,7 +41,7 @@ def edit(request: EditRequest) -> int:
 
     def announce(address: str, *of_lan: str) -> None:
         show("".join(f"{each}\n" for each in (address, *of_lan)))
-        say(f"the workbench is there, for this computer{'' if of_lan else ' alone'}; Ctrl-C ends it")
+        say(f"the workbench is open at this address{'' if of_lan else ', for this computer only'}; Ctrl-C closes it")
         if not request.no_browser:
             lead_browser(address, until_end)
 

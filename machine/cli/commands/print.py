@@ -5,10 +5,12 @@ from contextlib import contextmanager
 from datetime import datetime
 from functools import partial
 from pathlib import Path
+from time import monotonic
 
 from machine.cli.terminal.at_terminal import AtTerminal, exit_code
 from machine.cli.terminal.report import print_table
 from machine.cli.terminal.requests import PrintOptions, ResumeOptions, WatchOptions
+from machine.link.print_state import PrintState
 from machine.notices import plain_line, say, show
 from machine.pipeline.output import check_model_files, check_writable, printing_files, program_beside
 from machine.pipeline.programs import LoadedProgram, load_program
@@ -19,6 +21,7 @@ from machine.printing.journal_folder import check_new_journal, resumable_journal
 from machine.printing.printers import check_print, open_printer, open_server_printer
 from machine.printing.resumption import print_rest, read_resumption, rest_of
 from machine.printing.server_print import file_name, running_print
+from machine.quantities import duration
 from machine.view.serving.watch_page import Watched, serve_watch_page
 from profiles.errors import GcodeError, JournalError, ServerError
 from profiles.profile import Profile
@@ -34,9 +37,12 @@ def print_model(request: ModelRequest, port: str, asked: PrintOptions) -> int:
     with open_printer(job, person) as printer:
         loaded = check_print(job, printer)
         show(print_table(loaded.program, loaded.profile))
+        began_s = monotonic()
         with _watched(loaded, asked.watching, person) as watched:
             end = printer.print(loaded)
             watched.end(end.state)
+    if end.state is PrintState.DONE:
+        show(f"done in {duration(monotonic() - began_s)}\n")
     return exit_code(end)
 
 

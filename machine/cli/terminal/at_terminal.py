@@ -157,7 +157,7 @@ def status_line(status: PrintStatus) -> str:
     nozzle, bed = status.temperature.nozzle_c, status.temperature.bed_c
     if nozzle is not None:
         old = f" as last known {status.heat_age_s:.0f} s ago" if status.heat_is_old else ""
-        phrases.append(f"nozzle {nozzle:.0f} C" + (f", bed {bed:.0f} C" if bed is not None else "") + old)
+        phrases.append(f"nozzle {nozzle:.0f} °C" + (f", bed {bed:.0f} °C" if bed is not None else "") + old)
     if status.left_s is not None:
         phrases.append(f"{duration(status.left_s)} left")
     return f"{status.state}: " + ", ".join(phrases) + (f"; {status.message}" if status.message else "")

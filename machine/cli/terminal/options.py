@@ -96,13 +96,15 @@ def _profile_option(kind: str, otherwise: str = "") -> Any:
     return typer.Option(f"--{kind}", metavar="NAME|FILE", autocompletion=_names_of(kind), help=words)
 
 
-Model = Annotated[str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME")]
+Model = Annotated[
+    str, typer.Argument(metavar="MODEL", help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP, IGES or DAE file, or demo:NAME")
+]
 Models = Annotated[
     list[str],
     typer.Argument(
         metavar="MODEL",
         show_default=False,
-        help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP or DAE file, or demo:NAME; several share the plate, NAME:3 prints three",
+        help="STL, OBJ, OFF, PLY, 3MF, GLB, glTF, STEP, IGES or DAE file, or demo:NAME; several share a plate, NAME:3 is three",
     ),
 ]
 ModelsOrGcode = Annotated[
@@ -113,7 +115,9 @@ ModelsOrGcode = Annotated[
 ]
 MachineName = Annotated[str, _profile_option("machine")]
 MachineGiven = Annotated[str | None, _profile_option("machine", OF_FILE)]
-Settings = Annotated[tuple[str, ...], option("--set KEY=VALUE", "override a profile key; repeatable")]
+Settings = Annotated[
+    tuple[str, ...], option("--set KEY=VALUE", "override a profile key, as process.infill_density=20%; repeatable")
+]
 JsonFile = Annotated[Path | None, option("--json FILE", "write the result as JSON; - for standard output")]
 HtmlFile = Annotated[Path | None, option("--html FILE", "page to write for a browser, see view")]
 Force = Annotated[bool, option("--force", "go on although the dry run found errors")]
@@ -146,6 +150,8 @@ class SearchOptions:
     part: Annotated[
         tuple[str, ...], option("--part N:KEY=VALUE,...", "process keys of part N alone, such as 2:walls=4; repeatable")
     ] = ()
+
+    verbose: Annotated[bool, option("-v --verbose", "also say how many cuts the search tried and why it rejected them")] = False
 
     @property
     def settings(self) -> list[str]:
@@ -180,7 +186,7 @@ class ProgramOptions(FileOptions):
         tuple[str, ...],
         option("--filament-change PART:LAYER", "change the filament before this layer, or at a height; repeatable"),
     ] = ()
-    copies: Annotated[int | None, option("--copies N", "number of copies of each model on the plate, 1 by default")] = None
+    copies: Annotated[int | None, option("--copies N", "copies of each model on the plate; 1 by default")] = None
 
 
 @dataclass(frozen=True)
@@ -283,6 +289,7 @@ def model_request(
         parts=search.parts,
         copies=1 if copies is None else copies,
         plate=file.plate,
+        verbose=search.verbose,
         **further,
     )
     return request if project is None else project.applied(request, Path(model), copies)

@@ -1,14 +1,17 @@
 """Tables that the commands print."""
 
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from textwrap import wrap
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from machine.dryrun.dryrun import DryRun, summary
+from machine.pipeline.requests import STDOUT
 from machine.program import Alternative, Program
 from machine.quantities import duration, filament_g, minutes, newtons, percent, price_in_words, price_json
+from profiles.messages import terminal_words
 from profiles.profile import Profile
 from slicer.paths import SlicedPart
 
@@ -31,20 +34,23 @@ def table(rows: list[list[str]]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def parts_table(decomposition: "Decomposition", angle_deg: float = 45.0, count_platform_faces: bool = False) -> str:
-    """Table of the parts in print order, with risky areas before (printed straight up) and after the cuts; then the front."""
+def parts_table(
+    decomposition: "Decomposition", angle_deg: float = 45.0, count_platform_faces: bool = False, verbose: bool = False
+) -> str:
+    """The parts in print order, the area of each that needs support and what would need it uncut; then the front.
+
+    angle_deg and count_platform_faces as the search had them. verbose: how much the search tried, too.
+    """
     from machine.view.parts import risky_before_mm2
 
-    rows = [["part", "tilt deg", "turn deg", "base mm", "volume mm³", "share", "risky before", "after mm²"]]
+    rows = [["part", "tilt deg", "turn deg", "base mm", "volume mm³", "share", "needs support mm²", "uncut"]]
     for part in decomposition.parts:
         angles = [f"{part.pose.tilt_deg:.1f}", f"{part.pose.turn_deg:.1f}", f"{part.base.offset_mm:.1f}"]
         share = f"{100 * part.volume_mm3 / decomposition.volume_mm3:.1f} %"
-        areas = [_number(risky_before_mm2(part, angle_deg, count_platform_faces)), _number(part.risky_area_mm2)]
+        areas = [_number(part.risky_area_mm2), _number(risky_before_mm2(part, angle_deg, count_platform_faces))]
         rows.append([str(part.index), *angles, f"{part.volume_mm3:.0f}", share, *areas])
     front = "\n" + front_table(decomposition.front) if len(decomposition.front) > 1 else ""
-    effort = f"{decomposition.candidates_evaluated} candidates in {decomposition.search_s:.1f} s\n"
-    if decomposition.candidates_evaluated == 0 and len(decomposition.parts) > 1:
-        effort = f"cut by a plan in {decomposition.search_s:.1f} s\n"
+    effort = f"{decomposition.candidates_evaluated} candidates in {decomposition.search_s:.1f} s\n" if verbose else ""
     return table(rows) + effort + front + "\n"
 
 
@@ -63,15 +69,13 @@ def joints_table(joints: "Sequence[Joint]") -> str:
         lengths = [f"{joint.seam_mm:.0f}", f"{joint.arm_mm:.1f}"]
         forces = [newtons(joint.load_n), newtons(joint.tension_n)]
         rows.append([str(joint.part), f"{joint.area_mm2:.1f}", *shares, *lengths, *forces])
-    sentence = (
-        f"weakest: the joint of part {weakest.part}, by estimate it breaks at {newtons(weakest.load_n)} N sideways at the far end"
-    )
+    sentence = f"weakest: part {weakest.part} breaks off at about {newtons(weakest.load_n)} N sideways at its tip"
     return table(rows) + sentence + "\n\n"
 
 
 def front_table(front: "Sequence[FrontRow]") -> str:
-    """Table of the best decomposition for each number of parts; the chosen one is marked with the reason."""
-    rows = [["in parts", "needs support mm²", "seams mm", "stairs mm²", "costs mm²", "about", "filament m"]]
+    """The best decomposition for every number of parts, the chosen one marked and why."""
+    rows = [["in parts", "needs support mm²", "seams mm", "stair-stepping mm²", "cost mm²", "time", "filament m"]]
     rows += [
         [
             str(row.parts),
@@ -84,8 +88,8 @@ def front_table(front: "Sequence[FrontRow]") -> str:
         for row in front
     ]
     head, *lines = table(rows).splitlines()
-    taken = [row.chosen * f"  taken: {row.reason}" for row in front]
-    return "\n".join([head, *(line + reason for line, reason in zip(lines, taken, strict=True))]) + "\n"
+    reasons = [row.chosen * f"  chosen: {row.reason}" for row in front]
+    return "\n".join([head, *(line + reason for line, reason in zip(lines, reasons, strict=True))]) + "\n"
 
 
 def estimates(row: "FrontRow") -> list[str]:
@@ -126,12 +130,26 @@ def _filament_mm(program: Program) -> float:
     return float(np.max(program.run.program.filament_mm, initial=0.0))
 
 
+def verdict(run: DryRun) -> str:
+    """Whether a program can be printed, with the number of its warnings or errors."""
+    warnings = sum(finding.severity == "warning" for finding in run.findings)
+    if run.errors:
+        return f"not ready to print, {_count(len(run.errors), 'errors')}"
+    return "ready to print" + (f", {_count(warnings, 'warnings')}" if warnings else "")
+
+
+def written_line(files: Sequence[Path | None], verdict: str) -> str:
+    """Which files a command has written, and what they are good for."""
+    names = ", ".join(str(file) for file in files if file is not None and file != STDOUT)
+    return f"wrote {names}: {verdict}\n" if names else f"{verdict}\n"
+
+
 def run_table(run: DryRun) -> str:
     """Table of the dry run's figures and findings."""
     values = summary(run)
     lines = [
         f"time {duration(values['time_s'])}, filament {values['filament_mm'] / 1000:.2f} m, "
-        f"{values['extruded_mm3'] / 1000:.2f} cm3",
+        f"{values['extruded_mm3'] / 1000:.2f} cm³",
         ", ".join(_count(values[key], key) for key in ("parts", "layers", "reorientations", "retractions"))
         + f", {values['travel_mm'] / 1000:.2f} m travel",
     ]
@@ -155,7 +173,9 @@ def part_settings_lines(profile: Profile) -> str:
 def _wrap_finding(severity: str, message: str) -> list[str]:
     """A finding wrapped to lines with a hanging indent; profile keys are not broken."""
     indent = " " * len(f"{severity}: ")
-    lines = wrap(message, WIDEST, initial_indent=f"{severity}: ", subsequent_indent=indent, break_long_words=False)
+    lines = wrap(
+        terminal_words(message), WIDEST, initial_indent=f"{severity}: ", subsequent_indent=indent, break_long_words=False
+    )
     return [line.replace(NO_BREAK, " ") for line in lines]
 
 
@@ -164,7 +184,7 @@ def interfaces_line(interface_mm3: Mapping[int, float]) -> str:
     if not interface_mm3:
         return ""
     of_parts = ", ".join(f"part{NO_BREAK}{index} {mm3 / 1000:.2f}" for index, mm3 in interface_mm3.items())
-    sentence = f"interfaces take {sum(interface_mm3.values()) / 1000:.2f} cm3 that one piece would not: {of_parts}"
+    sentence = f"interfaces take {sum(interface_mm3.values()) / 1000:.2f} cm³ that one piece would not: {of_parts}"
     lines = wrap(sentence, WIDEST, subsequent_indent="  ", break_long_words=False)
     return "\n".join(lines).replace(NO_BREAK, " ") + "\n"
 
@@ -191,7 +211,7 @@ def _count(number: int, things: str) -> str:
 
 def compare_table(alternatives: tuple[Alternative, ...]) -> str:
     """Table of the alternatives."""
-    rows = [["print", "time", "filament", "mass", "support", "interfaces", "risky area"]]
+    rows = [["print", "time", "filament", "mass", "support", "interfaces", "needs support"]]
     rows += [[way.name, *_costs(way), f"{way.risky_mm2:.1f} mm²"] for way in alternatives]
     head, *lines = table(rows).splitlines()
     notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
@@ -204,5 +224,5 @@ def _costs(alternative: Alternative) -> list[str]:
         return ["-"] * 5
     filament_m, support_cm3 = (alternative.filament_mm or 0.0) / 1000, (alternative.support_mm3 or 0.0) / 1000
     mass = f"{alternative.filament_g or 0.0:.1f} g"
-    volumes = [f"{support_cm3:.2f} cm3", f"{sum(alternative.interface_mm3.values()) / 1000:.2f} cm3"]
+    volumes = [f"{support_cm3:.2f} cm³", f"{sum(alternative.interface_mm3.values()) / 1000:.2f} cm³"]
     return [duration(alternative.time_s), f"{filament_m:.2f} m", mass, *volumes]

@@ -253,7 +253,7 @@ class CalibrationRequest:
     save: Annotated[str | None, option("--save NAME", "name of your profile; default: the machine's")] = None
     replace: Replace = False
     force: Annotated[bool, option("--force", "save although touches or readings are far off")] = False
-    directions: Annotated[bool, option("--directions", "find the directions of the axes, too")] = False
+    directions: Annotated[bool, option("--directions", "also find the directions of the axes")] = False
     probing: ProbeOptions = ProbeOptions()
     given: MachineOptions = MachineOptions()
 

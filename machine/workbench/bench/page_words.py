@@ -23,46 +23,44 @@ OPTIONS = {
     "--plan": ("the plan", "the plan {}"),
     "--plate": ("the plate", "plate {}"),
     "--port": ("the port", "{}"),
-    "--ranker": ("the ranking", "Ranked as {}"),
+    "--ranker": ("the ranking", "Search ranking {}"),
     "--sim-speed": ("the speed of the simulated printer", ""),
     "advice --filament-change": ("a filament change", "{} under Copies and pauses"),
     "advice --pause": ("a pause", "{} under Copies and pauses"),
     "advice --baud": ("choose the baud rate", "choose the baud rate {}"),
-    "advice --parts": ("take another under In how many parts", "take {} under In how many parts"),
+    "advice --parts": ("choose another number of parts", "choose {} parts"),
 }
 PHRASES = {
-    "again": "try it again",
+    "again": "try again",
     "another baud rate": "try another baud rate",
-    "another plate": "another can be taken below",
-    "compiling": "",
+    "another plate": "choose another one below",
+    "compiling": "getting ready (only the first run needs to)",
     "for all": "set it for all parts",
-    "force": "tick Go on all the same to print it nevertheless",
-    "found by the search": "leave the part out of the plan and have it found by Find the others",
-    "compiled": "getting ready: {} steps are done",
-    "hand over": "tick Only hand the file over meanwhile",
+    "force": "tick Go on anyway to print it",
+    "found by the search": "leave the part out of the plan and use Find the others",
+    "compiled": "getting ready: {} steps done",
+    "hand over": "or tick Only hand the file over",
     "homed as in": "under Homed as in",
     "homed as in names": "Homed as in names",
     "its baud rate": "its baud rate",
-    "machine of those": "take a machine of those under Settings",
-    "least offset": "the offset must be at least {} mm",
+    "machine of those": "choose one of these machines under Settings",
     "offset": "the offset is {} mm",
-    "thin": "{}",
     "protected": "protected area {}",
     "page": "{}",
-    "one part": "take 1 under In how many parts",
+    "one part": "choose 1 part",
     "settings": "Settings",
     "": "",
 }
 
 
 def page_words(message: str) -> str:
-    """The message with the page's fields in place of options, and labels in place of keys.
+    """The message with the page's fields in the place of options, and labels in that of keys.
 
     >>> from profiles.messages import advice, key_name
     >>> page_words(f"{key_name('process.walls')} is -3: it must be a whole number from 0 to 50")
     'Walls is -3: it must be a whole number from 0 to 50'
-    >>> page_words(f"4 parts would save 21 mm² of blemishes but take 12 min longer: {advice('parts', 4)}")
-    '4 parts would save 21 mm² of blemishes but take 12 min longer: take 4 under In how many parts'
+    >>> page_words(f"4 parts would save 21 mm² of visible marks but take 12 min longer: {advice('parts', 4)}")
+    '4 parts would save 21 mm² of visible marks but take 12 min longer: choose 4 parts'
     """
     return rendered(message, _words)
 

@@ -43,7 +43,7 @@ def gone_in_words(word: str, gone: Sequence[tuple[int, str]]) -> str:
         return ""
     numbers, options = {part for part, _ in gone}, ", ".join(option for _, option in gone)
     parts = "their parts" if len(numbers) > 1 else f"part {gone[0][0]}"
-    return f"{word}: taken away with {parts}: {options} (Undo brings {'them' if len(gone) > 1 else 'it'} back)"
+    return f"{word}: removed with {parts}: {options} (Undo brings {'them' if len(gone) > 1 else 'it'} back)"
 
 
 def with_part_setting(profile: Profile, part: int, key: str, value: str | None) -> Profile:

@@ -1,6 +1,8 @@
 """Settings: the profile as a page shows it, the user's changes to it, and the command line that reproduces the bench."""
 
+from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -20,7 +22,7 @@ from profiles.errors import ProfileError
 from profiles.frozen import TITLES, Frozen, may_be_left_out, unit_of
 from profiles.machine import GCODE
 from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
-from profiles.places import OF_KIND, known
+from profiles.places import OF_KIND, known, shipped, tables
 from profiles.profile import DEFAULTS, SECTIONS, Profile, load, with_part_settings
 from profiles.toml_text import read_value, rows_text, value_text
 
@@ -82,6 +84,27 @@ def with_name(given: Given, kind: str, name: str) -> Given:
     if name not in known(kind):
         raise ProfileError(f"{name!r} is no {kind}: {', '.join(known(kind))} are known")
     return with_value(given, kind, name)
+
+
+def profile_labels(kind: str, chosen: str) -> dict[str, str]:
+    """Map the names of machines, materials or processes to readable ones, sorted by these. chosen: the present one or a file."""
+    called, ours = {chosen: Path(chosen).stem}, shipped(kind)
+    for name in known(kind):
+        called[name] = _shipped_label(kind, name) if name in ours else _label(kind, name)
+    often = Counter(called.values())
+    labels = {name: label if often[label] == 1 else f"{label} ({name})" for name, label in called.items()}
+    return dict(sorted(labels.items(), key=lambda entry: entry[1].lower()))
+
+
+def _label(kind: str, name: str) -> str:
+    """The readable name in a profile; the name of its file if it has none or cannot be read."""
+    with suppress(ProfileError, KeyError, TypeError):
+        label = str(tables(kind, name)[kind]["name"])
+        return label[:1].upper() + label[1:]
+    return name
+
+
+_shipped_label = cache(_label)  # other files may change
 
 
 def profile_as_given(given: Given, before: Profile) -> Profile:

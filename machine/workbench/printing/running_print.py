@@ -9,7 +9,7 @@ from typing import Annotated
 from pydantic import Field
 
 from machine.crash import bug_in_words
-from machine.link.pending_commands import MOST_OFFSET_MM, Command
+from machine.link.pending_commands import FEED_PERCENT, FLOW_PERCENT, MOST_OFFSET_MM, Command
 from machine.link.print_state import PrintState, follows
 from machine.printing.destination import Server, Simulated
 from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
@@ -23,7 +23,8 @@ from profiles.errors import PrinterError, UserError
 MAIN = "from machine.workbench.printing.process import main; main()"
 EMERGENCY_S = 5.0  # for the print's own process, which tries for 2.5 s to stop the printer, before the server does it
 LEAVE_S = 5.0  # for a declined print to release its port
-Percent = Annotated[int, Field(ge=0, le=10_000)]
+FeedPercent = Annotated[int, Field(ge=FEED_PERCENT[0], le=FEED_PERCENT[1])]
+FlowPercent = Annotated[int, Field(ge=FLOW_PERCENT[0], le=FLOW_PERCENT[1])]
 Babystep = Annotated[float, Field(ge=-MOST_OFFSET_MM, le=MOST_OFFSET_MM, allow_inf_nan=False)]
 HandWord = Annotated[HandDoes, Field(strict=False)]  # a string in JSON
 DIED = "the process that printed has ended before the print was done"
@@ -119,11 +120,11 @@ class RunningPrint:
     def resume(self) -> None:
         self.say((Command.RESUME,))
 
-    def feed(self, *, percent: Percent) -> None:
+    def feed(self, *, percent: FeedPercent) -> None:
         """Set the speed, percent of the programmed one."""
         self.say((Command.FEED, float(percent)))
 
-    def flow(self, *, percent: Percent) -> None:
+    def flow(self, *, percent: FlowPercent) -> None:
         """Set the flow, percent of the programmed one."""
         self.say((Command.FLOW, float(percent)))
 

@@ -17,7 +17,7 @@ from mdp.search.plan_file import planned_parts
 from profiles.errors import PlanError, UserError
 from profiles.frozen import Vector
 
-ENDED = "slicing has ended, for what lies on the workbench is another now: slice it again"
+ENDED = "slicing was stopped, for the model on the workbench has changed: slice it again"
 
 
 class Finding(Derived[Found]):
@@ -55,7 +55,7 @@ class Finding(Derived[Found]):
             return "The search was stopped before it had cut anything: all is as it was."
         taken = with_front(now, [replace(best, chosen=True)])
         self._session.do("stop the search", replace(taken, priced=best.time_s is not None))
-        return f"The search was stopped, and the best so far is taken: {best.parts} parts."
+        return f"The search was stopped; the best so far is used: {best.parts} parts."
 
     def _accept_found(self, found: Found) -> None:
         now = self._session.bench

@@ -170,7 +170,7 @@ class PlaneTrials:
         with self._session.waiting(f"looking for a neck near the plane of part {part}"):
             neck = await self._readiness.ask(near_neck, bench, bench.cuts, part, reach_mm)
         if neck is None:
-            where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no rim is shorter than all around it"
+            where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no section is narrower than its surroundings"
             raise PlanError(f"there is no neck near the plane of part {part}: {where}")
         normal, offset_mm = vector_of(neck.normal), float(neck.offset_mm)
         nearer = {"do": "move", "part": part, "normal": list(normal), "offset_mm": offset_mm, "near": True}

@@ -26,7 +26,7 @@ from machine.workbench.access.gate import Gate
 from machine.workbench.access.network import Lan
 from machine.workbench.access.pairing import Door
 from machine.workbench.bench.page_words import page_words
-from machine.workbench.bench.settings import export_command, file_stem, settings_list, settings_of
+from machine.workbench.bench.settings import export_command, file_stem, profile_labels, settings_list, settings_of
 from machine.workbench.printing.prints import Prints
 from machine.workbench.session.base import hear_from, in_loop
 from machine.workbench.session.commands import Need, check_need
@@ -40,7 +40,7 @@ from machine.workbench.work.cutting import make_folder, make_pictures, make_plan
 from machine.workbench.work.models import mark_faces, rest_facets
 from machine.workbench.work.slices import Sliced, share_page
 from profiles.errors import PlanError
-from profiles.places import KINDS, known
+from profiles.places import KINDS
 
 Act = Callable[[Session, Request], Awaitable[Response]]
 OWN = Path(__file__).parent / "page"
@@ -364,7 +364,7 @@ def _settings(uploads: Uploads) -> Act:
     async def answer(session: Session, request: Request) -> Response:
         given = uploads.as_shown(session.bench.given)
         bench = replace(session.bench, given=given)
-        names = {kind: {"names": sorted({*known(kind), getattr(given, kind)}), "name": getattr(given, kind)} for kind in KINDS}
+        names = {kind: {"labels": profile_labels(kind, getattr(given, kind)), "name": getattr(given, kind)} for kind in KINDS}
         rows = settings_list(bench.profile, session.bench.given, _number(request.query_params.get("part", "")))
         return JSONResponse({"profiles": names, "settings": rows, "command": export_command(bench)})
 

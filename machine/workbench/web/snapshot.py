@@ -55,7 +55,7 @@ def verdict_of(findings: Sequence[Finding], profile: Profile, hanging_mm2: float
         return verdict | {"kind": "problem", "text": f"{count}: {first.message}", "finding": errors[0], "remedy": remedy}
     process = profile.process
     if process.support == "none" and not process.spiral_vase and hanging_mm2 > process.support_least_mm2:
-        return verdict | {"text": f"Ready to print, but {hanging_mm2:.0f} mm² hang over without support", "remedy": SUPPORT_ON}
+        return verdict | {"text": f"Ready to print, but {hanging_mm2:.0f} mm² would need support", "remedy": SUPPORT_ON}
     warnings = f"; {len(findings)} warning{'s' * (len(findings) > 1)} below" if findings else ""
     return verdict | {"text": f"Ready to print{warnings}"}
 
@@ -84,10 +84,10 @@ def _figures(alternative: Alternative, material: Material) -> list[tuple[str, st
         "time": about(alternative.time_s or 0.0),
         "plastic": f"{filament_g(mm, material):.1f} g",
         "costs": price_in_words(mm, material),
-        "of it support": f"{support_mm3 / 1000.0:.2f} cm³",
-        "scars of support": _mm2(alternative.risky_mm2),
+        "support": f"{support_mm3 / 1000.0:.2f} cm³",
+        "support marks": _mm2(alternative.risky_mm2),
         "seams between parts": f"{alternative.seam_mm:.0f} mm",
-        "stairs": _mm2(alternative.stairs_mm2),
+        "stair-stepping": _mm2(alternative.stairs_mm2),
         "findings": f"{alternative.findings}",
     }
     return [(name, text if alternative.time_s is not None else "–") for name, text in figures.items() if text]

@@ -46,7 +46,7 @@ from profiles.errors import MoveError, PlanError
 from profiles.profile import Profile, load
 
 PLAN_NAME = "plan.toml"
-AS_IT_STANDS = "Undo, then Find parts without Lay it down, too, keeps it as it stands"  # in the words of the page
+AS_IT_STANDS = "to keep the file's: Undo, then clear “Also choose the best orientation” and find parts again"  # the page's label
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # makes the bytes reproducible
 UNTILTED = 1.0 - 1e-9  # least cosine between normals that differ by rounding only
 _ready: tuple[int, Trials] | None = None  # cache of the bench that this process served last
@@ -83,7 +83,7 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
     price, best = pricing(profile.of_all_parts), None
 
     def search(candidate: Mesh) -> Decomposition:
-        otherwise = "" if candidate is mesh else "laid down otherwise: "
+        otherwise = "" if candidate is mesh else "in another orientation: "
 
         def say(phase: str) -> None:
             tell(Searched(f"{otherwise}{phase}", best))

@@ -25,19 +25,21 @@ def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> Non
     oriented = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
     side, upright = best_orientation(tee(), 45.0), facet_orientations(tee(), 45.0)[0]
     assert orientation_in_words(Oriented(side, oriented, 900.0, CUT, upright, True, True), "--as-is keeps it so") == (
-        "it is placed on its front (turned 90 about x): in one piece with 0 mm² of blemishes in 30m, as it stands in 3 parts with"
-        " 78 mm² of blemishes in 1h 0m; --as-is keeps it so",
+        "oriented on its front (turned 90 about x): in one piece with 0 mm² of visible marks in 30m, standing as in its file"
+        " in 3 parts with 78 mm² of visible marks in 1h 0m; --as-is keeps it so",
     )
     assert orientation_in_words(Oriented(side, oriented, 900.0, None, upright, True, True), "--as-is keeps it so") == (
-        "it is placed on its front (turned 90 about x): in one piece with 0 mm² of blemishes in 30m, as it stands 300 mm² hang"
-        " over; --as-is keeps it so",
+        "oriented on its front (turned 90 about x): in one piece with 0 mm² of visible marks in 30m, standing as in its file"
+        " 300 mm² would need support; --as-is keeps it so",
     )
     assert orientation_in_words(Oriented(None, oriented, 900.0, WHOLE, upright, True, True), "--as-is keeps it so") == ()
 
 
 def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
     oriented = Oriented(None, alone(tee(), 300.0), 900.0, WHOLE, facet_orientations(tee(), 45.0)[0], False, False)
-    warning = "its base may be too small to hold it: think of a wide brim (process.brim_mm) or another side (process.rotate_deg)"
+    warning = (
+        "its base may be too small to hold it: consider a wide brim (process.brim_mm) or another orientation (process.rotate_deg)"
+    )
     assert terminal_words(HARDLY_HELD) == warning
     assert orientation_in_words(oriented, "--as-is keeps it so") == (HARDLY_HELD,)
     turned = replace(oriented, orientation=best_orientation(tee(), 45.0))
@@ -48,7 +50,7 @@ def test_a_model_that_is_turned_because_the_plate_would_not_hold_it_is_told_so()
     laid = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
     side, upright = best_orientation(tee(), 45.0), facet_orientations(tee(), 45.0)[0]
     (told,) = orientation_in_words(Oriented(side, laid, 900.0, None, upright, True, False), "--as-is keeps it so")
-    assert ", as it stands the plate would hardly hold it; --as-is" in told
+    assert "standing as in its file it would hardly hold on the plate; --as-is" in told
 
 
 def test_a_model_that_is_not_turned_is_tested_on_the_plate() -> None:

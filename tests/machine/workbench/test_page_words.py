@@ -26,17 +26,17 @@ from tests.machine.workbench.models import model
 PAIRS = [
     (f"{option('copies')} is 0: 1 to 1000 is allowed", "Copies is 0: 1 to 1000 is allowed"),
     (f"{option('copies', 3)}: a.gcode is G-code", "3 copies: a.gcode is G-code"),
-    (f"{option('ranker', 'x')}: classic, learned or the name", "Ranked as x: classic, learned or the name"),
+    (f"{option('ranker', 'x')}: classic, learned or the name", "Search ranking x: classic, learned or the name"),
     (f"{advice('filament-change', '1:x')}: PART:LAYER or", "1:x under Copies and pauses: PART:LAYER or"),
     (f"give them up, {advice('set', 'process.scale=25.4', 'give')}", "give them up, set Scale of the model to 25.4"),
     (f"{option('set', 'process.walls=4')} and", "Walls = 4 and"),
-    (f"X (lists all, {FORCE_GOES_ON})", "X (lists all, tick Go on all the same to print it nevertheless)"),
+    (f"X (lists all, {FORCE_GOES_ON})", "X (lists all, tick Go on anyway to print it)"),
     (f"{key_name('machine.tilt.limits_deg')} is [5, 3]", "Tilt axis: Range is [5, 3]"),
     (f"{key_name('machine.gcode.end')}: placeholder {{nozzle_c}}", "G-code blocks: End G-code: placeholder {nozzle_c}"),
     (f"at most 0.9 of {key_name('process.line_width_mm', 'line_width_mm')}", "at most 0.9 of Line width"),
     (f"{option('parts', 9)}: the search found no more than 3", "the number of parts 9: the search found no more than 3"),
-    (f"would save 3 mm²: {advice('parts', 4)}", "would save 3 mm²: take 4 under In how many parts"),
-    (f"a sliver{phrase('', ' (criterion II)')}", "a sliver"),
+    (f"would save 3 mm²: {advice('parts', 4)}", "would save 3 mm²: choose 4 parts"),
+    (f"a sliver{phrase('', ' ([[keep]])')}", "a sliver"),
     (f"{option('certificate', 'a.pem')} cannot be read", "--certificate a.pem cannot be read"),
 ]
 
@@ -81,7 +81,7 @@ def test_the_program_s_own_sentences_have_no_option_on_the_page() -> None:
     sentences = [*REASONS.values(), *(text for _, *texts in ports.NO_PRINTERS.values() for text in texts), f"{refused.value}"]
     for sentence in sentences:
         assert re.search(r"(^|\s)--\w|\bsearch\.", page_words(sentence)) is None
-    assert page_words(REASONS[Reason.PLATFORM]) == "the plane would cut the build plate"
+    assert page_words(REASONS[Reason.PLATFORM]) == "it would cut into the build plate"
 
 
 def test_what_is_not_marked_stays_whatever_its_name_is() -> None:

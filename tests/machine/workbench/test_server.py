@@ -154,15 +154,15 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
         page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
         bench.send(folder / "tee.stl")
         page.do("search", ranker="none")
-        assert "Ranked as none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
+        assert "Search ranking none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
         page.do("search", orient=False)
         as_it_lies = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
-        assert not any("it is placed" in note for note in as_it_lies["notes"])
+        assert not any("oriented" in note for note in as_it_lies["notes"])
         page.do("search", ranker="learned")
         laid = page.until(lambda state: state["rotation"] != as_it_lies["rotation"] and not state["search"])
-        (told,) = (note for note in laid["notes"] if "it is placed" in note)
-        assert told.startswith("it is placed on its front (turned 90 about x): in one piece with 0 mm² of blemishes")
-        assert told.endswith("; Undo, then Find parts without Lay it down, too, keeps it as it stands")
+        (told,) = (note for note in laid["notes"] if "oriented" in note)
+        assert told.startswith("oriented on its front (turned 90 about x): in one piece with 0 mm² of visible marks")
+        assert told.endswith("; to keep the file's: Undo, then clear “Also choose the best orientation” and find parts again")
         assert laid["front"][0]["support_area_mm2"] < as_it_lies["front"][0]["support_area_mm2"]
         assert bench.ask("plan.toml")[1] == (folder / "parts" / "plan.toml").read_bytes()
         page.do("undo")
@@ -290,7 +290,7 @@ def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_
         parts, upright, _ = page.until(lambda state: state["compared"])["compared"]
         ours, other = dict(parts["figures"]), dict(upright["figures"])
         assert (parts["name"], ours["findings"]) == ("in 2 parts", f"{len(sliced['findings'])}")
-        assert float(other["of it support"].split()[0]) > float(ours["of it support"].split()[0])
+        assert float(other["support"].split()[0]) > float(ours["support"].split()[0])
         assert (ours["seams between parts"] != "0 mm", other["seams between parts"]) == (True, "0 mm")
         assert bench.ask("print.html")[1] == (folder / "tee.html").read_bytes()  # with the comparison, as of --compare
         page.do("turn", axis="z", deg=30)

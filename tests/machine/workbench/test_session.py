@@ -260,7 +260,7 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
     session = when_done(work)
     assert [stop.at for stop in session.bench.stops] == ["1:3"]
     assert session.note.startswith(
-        f"turn the model: taken away with part 2: {option('pause', '2:8.4mm')} (Undo brings it back); slicing has ended"
+        f"turn the model: removed with part 2: {option('pause', '2:8.4mm')} (Undo brings it back); slicing was stopped"
     )
 
 
@@ -285,7 +285,7 @@ def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_b
         await asyncio.sleep(0)
         obey(session, {"do": "turn", "axis": "x", "deg": 90})
         await asyncio.sleep(0)
-        assert session.note.startswith("slicing has ended")
+        assert session.note.startswith("slicing was stopped")
         obey(session, {"do": "slice"})
         await asyncio.sleep(0)
         assert session.slicing.progress is not None
@@ -410,7 +410,7 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
     when_done(work)
     assert told == [
         "The search was stopped before it had cut anything: all is as it was.",
-        "The search was stopped, and the best so far is taken: 2 parts.",
+        "The search was stopped; the best so far is used: 2 parts.",
         "",
     ]
 

@@ -16,6 +16,7 @@ from machine.workbench.bench.settings import (
     check_block,
     export_command,
     profile_as_given,
+    profile_labels,
     settings_list,
     turns_deg,
     with_name,
@@ -57,6 +58,13 @@ def test_a_share_is_shown_as_a_percentage_and_its_key_stays_a_share() -> None:
     assert [density[word] for word in ("unit", "value", "unchanged", "least", "most")] == ["%", 7.0, 20.0, 0.0, 100.0]
     assert profile_as_given(with_setting(USUAL, "process.infill_density", "7%"), load()).process.infill_density == 0.07
     assert described("material.fan_bridge")["value"] is None
+
+
+def test_profiles_are_listed_by_what_people_call_them() -> None:
+    assert profile_labels("material", "pla") == {"abs": "ABS", "petg": "PETG", "pla": "PLA", "tpu": "TPU"}
+    labels = profile_labels("machine", "generic_ac")
+    assert (labels["generic_ac"], labels["three_axis"]) == ("Generic A/C table", "Three axes")
+    assert profile_labels("process", "gone.toml")["gone.toml"] == "gone"
 
 
 def test_choices_and_yes_or_no_are_told_as_such() -> None:
@@ -166,7 +174,7 @@ def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
     [
         ((LOW, HIGH, MIDDLE), "--pause 1:3 --pause 4:15 --filament-change 9:1", ""),
         ((HIGH, MIDDLE), "--pause 1:3 --pause 3:15 --filament-change 9:1", ""),
-        ((LOW,), "--pause 1:3 --filament-change 9:1", "cut: taken away with part 3: --pause 3:15 (Undo brings it back)"),
+        ((LOW,), "--pause 1:3 --filament-change 9:1", "cut: removed with part 3: --pause 3:15 (Undo brings it back)"),
     ],
 )
 def test_a_pause_goes_with_its_part_and_says_so_and_undo_brings_it_back(
@@ -191,7 +199,7 @@ def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_
     bench = with_own(with_own(BENCH, 3, "ironing", "true"), 1, "walls", "5")
     steps = History(Step("", replace(bench, stops=parse_stops(["3:15"], []))))
     after = steps.do("cut", with_cuts(steps.now.bench, (LOW,)))
-    lost = "cut: taken away with part 3: --pause 3:15, its own ironing=true (Undo brings them back)"
+    lost = "cut: removed with part 3: --pause 3:15, its own ironing=true (Undo brings them back)"
     assert terminal_words(after.now.lost) == lost
     assert own(after.undo().now.bench) == {1: {"walls": 5}, 3: {"ironing": True}}
     turned = changed(steps, "turn", axis="x", deg=90).now

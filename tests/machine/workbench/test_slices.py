@@ -88,7 +88,7 @@ def test_the_first_error_is_the_problem_and_says_which_finding_it_is() -> None:
 def test_what_hangs_gets_a_button_that_switches_support_on_where_it_is_off() -> None:
     off = load(settings=["process.support=none"])
     verdict = verdict_of((UNCALIBRATED,), off, 812.4, out_of_date=False)
-    assert (verdict["text"], verdict["remedy"]) == ("Ready to print, but 812 mm² hang over without support", SUPPORT_ON)
+    assert (verdict["text"], verdict["remedy"]) == ("Ready to print, but 812 mm² would need support", SUPPORT_ON)
     assert verdict_of((), load(), 812.4, out_of_date=False)["remedy"] is None
     assert verdict_of((), off, 0.5, out_of_date=False)["remedy"] is None
 

@@ -62,16 +62,16 @@ def test_every_further_part_saves_at_least_that_share_of_the_cost_of_one_piece(l
 
 
 def test_the_reason_names_the_demand_that_more_parts_do_not_meet() -> None:
-    assert choose(THREE, Weights(0.5), least_saving=0.19).reason == "more parts would save less than 19 % each"
+    assert choose(THREE, Weights(0.5), least_saving=0.19).reason == "each further part would save less than 19 %"
 
 
 def test_what_more_cuts_would_save_is_told_with_what_it_takes() -> None:
     choice = choose(THREE, Weights(0.5), least_saving=0.4)
-    assert choice.note == (f"3 parts would save 600 mm² of blemishes with 2 more cuts: {advice('parts', 3)}",)
+    assert choice.note == (f"3 parts would save 600 mm² of visible marks with 2 more cuts: {advice('parts', 3)}",)
     rows = front((1000.0, 900.0), (500.0, 800.0))
     rows = [replace(row, filament_mm=filament_mm) for row, filament_mm in zip(rows, (10_000.0, 12_000.0), strict=True)]
     choice = choose(rows, Weights(0.5), least_saving=0.6)
-    assert choice.note == (f"2 parts would save 500 mm² of blemishes but take 2.0 m more filament: {advice('parts', 2)}",)
+    assert choice.note == (f"2 parts would save 500 mm² of visible marks but take 2.0 m more filament: {advice('parts', 2)}",)
 
 
 def test_a_row_that_costs_more_than_one_with_fewer_parts_is_not_taken_however_fast() -> None:
@@ -86,8 +86,8 @@ def test_a_row_that_cannot_be_printed_is_not_taken_while_another_one_can() -> No
 
 def test_what_is_given_up_for_time_is_told_with_figures() -> None:
     choice = choose(BUNNY, Weights(1.0))
-    assert choice.reason == "the least cost with its time"
-    assert choice.note == (f"4 parts would save 501 mm² of blemishes but take 24 min longer: {advice('parts', 4)}",)
+    assert choice.reason == "the lowest cost, time included"
+    assert choice.note == (f"4 parts would save 501 mm² of visible marks but take 24 min longer: {advice('parts', 4)}",)
     assert choose(BUNNY, Weights(0.0)).note == ()
 
 
@@ -115,7 +115,7 @@ def test_of_two_rows_that_take_as_long_the_one_with_less_filament_is_taken_where
 
 
 def test_a_row_without_a_time_is_said_to_be_no_choice() -> None:
-    assert choose(front((200.0, 900.0), (100.0, None)), Weights(1.0)).reason == "the least cost of what can be printed well"
+    assert choose(front((200.0, 900.0), (100.0, None)), Weights(1.0)).reason == "the lowest cost that prints well"
 
 
 def test_where_time_counts_nothing_as_without_support_there_is_no_charge() -> None:

@@ -9,7 +9,7 @@ const orDash = (value, told) => (value === null ? "–" : told(value));
 const FRONT = [
   ["support mm²", (row) => Math.max(row.support_area_mm2, 0).toFixed(1)],
   ["seams mm", (row) => row.seam_mm.toFixed(0)],
-  ["stairs mm²", (row) => row.stairs_mm2.toFixed(0)],
+  ["stair-stepping mm²", (row) => row.stairs_mm2.toFixed(0)],
   ["about", (row) => orDash(row.time_s, roughly)],
   ["filament m", (row) => orDash(row.filament_mm, (length) => (length / 1000).toFixed(1))],
 ];
@@ -34,7 +34,7 @@ const pays = (row, fewer) => fewer.every(({ cost_mm2: cost }) => row.cost_mm2 < 
 
 function lineOf(row, idle, choose) {
   const mark = made("input", { type: "radio", name: "front", value: row.parts, checked: row.chosen, onchange: () => choose(row) });
-  const label = made("label", {}, mark, `${row.parts}`, ...(row.chosen ? [made("b", { text: "✓", title: `taken: ${row.why}` })] : []));
+  const label = made("label", {}, mark, `${row.parts}`, ...(row.chosen ? [made("b", { text: "✓", title: `chosen: ${row.why}` })] : []));
   const line = rowOf([label, ...FRONT.map(([, of]) => of(row))]);
   line.className = idle ? "idle" : "";
   line.onclick = ({ target }) => { if (!line.cells[0].contains(target)) label.click(); };
@@ -43,7 +43,7 @@ function lineOf(row, idle, choose) {
 
 /** What to know of the row that is looked at. */
 function showChoice(row, drawn) {
-  const told = !row ? ["Cut by a plan: none of these rows."] : row.chosen ? [`✓ taken: ${row.why}.`]
+  const told = !row ? ["Cut by a plan: none of these rows."] : row.chosen ? [`✓ chosen: ${row.why}.`]
     : [drawn ? "This is how it would be cut; " : "It was not made; ", made("code", { text: row.command }), " takes it, and ", made("code", { text: "--parts", className: "whole" }), " goes with every other command too."];
   $("front-told").replaceChildren(...told);
 }
@@ -78,7 +78,7 @@ export function findingsOf(print, scene, bells, camera, player) {
   const { findings } = print.header, placed = findings.flatMap((finding, k) => (finding.row >= 0 && finding.workpiece_mm ? [k] : []));
   let chosen = -1;
   $("tab-findings").textContent = `Findings (${findings.length})`;
-  $("findings").append(made("h2", { text: findings.length ? "Findings" : "The dry run finds nothing to complain about" }));
+  $("findings").append(made("h2", { text: findings.length ? "Findings" : "The dry run found no problem" }));
   const items = findings.map((finding, k) => findingButton(finding, () => choose(k), { disabled: finding.row < 0 }));
   $("findings").append(...items);
   const choose = (k) => {

@@ -8,9 +8,11 @@ import pytest
 
 from machine.cli.cli import main
 from machine.cli.commands.export import draw_layer, parse_layer
+from mdp.save import stl
 from profiles.errors import OutputError, SliceError
 from tests.machine.cli.test_cli import FAST
 from tests.machine.hand import printed
+from tests.shapes import box
 
 
 def test_export_draws_the_layer_that_it_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -39,3 +41,20 @@ def test_a_part_or_layer_that_is_not_there_is_named() -> None:
         draw_layer(printed()[2], 3, 1)
     with pytest.raises(SliceError, match=r"part 2 has no layer 4: its layers are 1 to 3"):
         draw_layer(printed()[2], 2, 4)
+
+
+def test_export_without_a_name_writes_the_model_s_here_and_ends_with_a_verdict(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("box.stl").write_bytes(stl(box(8, 8, 2)))
+    for _ in range(2):  # one of its own it writes over
+        assert main(["export", "box.stl", *FAST, "--as-is"]) == 0
+        assert capsys.readouterr().out.endswith("wrote box.gcode: ready to print, 1 warning\n")
+    Path("box.gcode").write_text("G28\n")
+    assert main(["export", "box.stl", *FAST]) == 1
+    assert "output box.gcode exists and was not written by tiltprint: -o names another file" in capsys.readouterr().err
+    assert main(["print", "box.stl", *FAST, "--as-is"]) == 0
+    told = capsys.readouterr()
+    assert "no --port is given, so the simulated printer prints" in told.err
+    assert re.search(r"\ndone in \d+s\n$", told.out)

@@ -123,7 +123,7 @@ def test_without_a_terminal_plain_lines_tell_the_progress(hours: str) -> None:
     os.kill(process.pid, signal.SIGHUP)
     assert process.wait(60) == 130
     process.communicate()
-    assert re.fullmatch(rb"printing: \d+ %, (part 1 of 1, layer 1, )?nozzle \d+ C, bed \d+ C, .* left\n", line)
+    assert re.fullmatch(r"printing: \d+ %, (part 1 of 1, layer 1, )?nozzle \d+ °C, bed \d+ °C, .* left\n", line.decode())
 
 
 def test_the_log_goes_where_it_is_asked_for(tmp_path: Path) -> None:

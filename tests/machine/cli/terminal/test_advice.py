@@ -18,22 +18,22 @@ CUT = FrontRow(PLANES, 30.0, 80.0, 78.0, stairs_mm2=6.0, time_s=3600.0, filament
 
 
 def test_what_was_chosen_is_advised() -> None:
-    decomposition = replace(tee_in_parts(), front=(WHOLE, replace(CUT, chosen=True, reason="the least cost")))
+    decomposition = replace(tee_in_parts(), front=(WHOLE, replace(CUT, chosen=True, reason="the lowest cost")))
     assert advice(decomposition, PROFILE).splitlines() == [
-        "print it      support mm²    less  seams mm  stairs mm²  about  filament m",
-        "in one piece        300.0                 0         125  1h 2m         4.0",
-        "in 3 parts           30.0  90.0 %        80           6  1h 0m         3.9",
-        "advice: print it in 3 parts",
+        "print it      needs support mm²    less  seams mm  stair-stepping mm²  cost mm²   time  filament m",
+        "in one piece              300.0                 0                 125     425.4  1h 2m         4.0",
+        "in 3 parts                 30.0  90.0 %        80                   6      78.0  1h 0m         3.9",
+        "best: print it in 3 parts",
     ]
 
 
 def test_whoever_asked_for_other_parts_is_told_which_cost_less() -> None:
-    decomposition = replace(alone(tee(), 300.0), front=(replace(WHOLE, chosen=True, reason="asked for"), CUT))
-    assert advice(decomposition, PROFILE).splitlines()[-1] == "advice: print it in 3 parts: --parts 3"
+    decomposition = replace(alone(tee(), 300.0), front=(replace(WHOLE, chosen=True, reason="chosen by you"), CUT))
+    assert advice(decomposition, PROFILE).splitlines()[-1] == "best: print it in 3 parts: --parts 3"
 
 
 def test_a_model_without_risk_is_one_part_and_saves_nothing() -> None:
-    assert advice(alone(box(), 0.0), PROFILE).splitlines()[1].split() == ["in", "one", "piece", "0.0", "0", "0", "-", "-"]
+    assert advice(alone(box(), 0.0), PROFILE).splitlines()[1].split() == ["in", "one", "piece", "0.0", "0", "0", "0.0", "-", "-"]
 
 
 def test_a_rounding_error_is_no_negative_share() -> None:

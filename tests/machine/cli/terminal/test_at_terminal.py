@@ -60,7 +60,7 @@ def test_temperatures_that_may_be_true_no_more_are_marked_with_their_age(old: di
     moment = replace(MOMENT, **old)
     mark = f"as last known {old['heat_age_s']:.0f} s ago"
     assert lines(moment)[2].startswith(f"{mark}:   nozzle 209.8 / 210 °C   bed 60.1 / 60 °C")
-    assert f"nozzle 210 C, bed 60 C {mark}, " in status_line(moment)
+    assert f"nozzle 210 °C, bed 60 °C {mark}, " in status_line(moment)
     for fresh in (replace(MOMENT, heat_age_s=14.0), replace(moment, temperature=Temperature())):
         assert not any("as last known" in line for line in (*lines(fresh), status_line(fresh)))
 

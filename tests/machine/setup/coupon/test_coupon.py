@@ -60,7 +60,7 @@ def test_from_the_program_by_a_simulated_print_to_own_profiles(capsys: pytest.Ca
     assert b"<html" in Path("bars.html").read_bytes()
 
     assert main(["print", "coupon.gcode", "--port", "sim", "--sim-speed", "0"]) == 0
-    laid = re.search(r"strokes laid ([\d.]+) cm3 \(planned ([\d.]+)\), heaters at 0 and 0", "".join(capsys.readouterr()))
+    laid = re.search(r"([\d.]+) cm³ of plastic laid \(planned ([\d.]+)\), heaters off", "".join(capsys.readouterr()))
     assert laid is not None
     assert float(laid[1]) == pytest.approx(float(laid[2]), rel=1e-3)
 

@@ -459,6 +459,12 @@ def prints_with_one(port: str = "sim") -> Prints:
     return prints
 
 
+@pytest.mark.parametrize(("does", "most"), [("feed", 300), ("flow", 200)])
+def test_a_speed_or_flow_out_of_range_is_refused_at_the_command(does: str, most: int) -> None:
+    with pytest.raises(PlanError, match=rf"percent is 5000: it must be a whole number from 10 to {most}"):
+        obey(page_of(prints_with_one()), {"do": does, "print": 1, "percent": 5000})
+
+
 @pytest.mark.parametrize("percent", [float("inf"), float("nan"), "fast", True, 99.5, [1]])
 def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
     with pytest.raises(PlanError, match=r"percent is .*: it must be a whole number"):

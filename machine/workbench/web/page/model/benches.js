@@ -119,6 +119,6 @@ function tellPairing({ closed, waits_until_s: end, devices }) {
 }
 
 function deviceRow({ number, name, paired_s: paired }, line) {
-  const since = `paired at ${clock(paired)}`, ariaLabel = `Let it go: ${name}, ${since}`;
-  return made("li", {}, made("span", {}, name, made("small", { text: since })), button("Let it go", () => line.send({ do: "unpair", device: number }), { ariaLabel }));
+  const since = `paired at ${clock(paired)}`, ariaLabel = `Unpair: ${name}, ${since}`;
+  return made("li", {}, made("span", {}, name, made("small", { text: since })), button("Unpair", () => line.send({ do: "unpair", device: number }), { ariaLabel }));
 }

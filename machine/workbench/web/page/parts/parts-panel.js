@@ -70,7 +70,7 @@ function tellRow(row) {
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [
     ["parts", `${row.parts}${byHand ? ", changed by hand since" : best ? ` (recommended: ${row.why})` : ""}`], ["area to support", figure("support_area_mm2", mm2)],
-    ["seams", figure("seam_mm", (long) => `${long.toFixed(0)} mm`)], ["stairs", figure("stairs_mm2", mm2)], ["takes about", figure("time_s", roughly)],
+    ["seams", figure("seam_mm", (long) => `${long.toFixed(0)} mm`)], ["stair-stepping", figure("stairs_mm2", mm2)], ["takes about", figure("time_s", roughly)],
     ["plastic", figure("filament_mm", (long) => `${(long / 1000).toFixed(1)} m`)],
   ]);
 }

@@ -55,7 +55,7 @@ export function showPrint(print, commands) {
     "run-news": `${print.name}: ${over ? print.sentence : [state, print.warning].filter(Boolean).join(": ")}`, // a reader need not hear every per cent
     "ask-told": print.question || (starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
       : "The server keeps the file; nothing prints before somebody starts it there."),
-    "begin": resumes ? "Yes, go on" : starts ? "Print now" : "Hand it over", "leave": resumes ? "No, leave it" : "Leave it", "pause": paused ? "Resume" : "Pause",
+    "begin": resumes ? "Yes, go on" : starts ? "Print now" : "Hand it over", "leave": resumes ? "No, leave it" : "Not now", "pause": paused ? "Resume" : "Pause",
     "sure-told": `Cancel this print? ${server ? "The server ends it, as its own macros say." : "The heaters go off, and what is printed stays as it is."}`,
     "held-told": print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.",
   });
@@ -67,7 +67,7 @@ export function showPrint(print, commands) {
   $("run-state").className = over ? state : "";
   $("pause").dataset.print = paused ? "resume" : "pause";
   $("run-log").href = `prints/${print.number}/log`;
-  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on all the same` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
+  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on anyway` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
   listIn("run-findings", asking && figures ? figures.findings : []);
   listIn("run-words", print.words.slice(-FEW));
   listIn("run-said", runs || uploads || over ? print.said.filter((line) => line && (!print.log || !line.includes(print.log))).slice(-FEW) : []);

@@ -11,17 +11,10 @@ const KINDS = ["machine", "material", "process"];
 const KIND_OF = { machine: "machine", material: "material", process: "process", search: "process" };
 const kept = keptInTab("settings", { level: "simple", folded: [] });
 
-/** A comma in a field of one number is a decimal point: browsers drop it, and 0,35 would become 035. */
-function decimalComma(event) {
-  if (event.target.type !== "number" || !event.data?.includes(",")) return;
-  event.preventDefault();
-  document.execCommand("insertText", false, event.data.replace(",", "."));
-}
-
 export function settingsPanel() {
   const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
   const explained = new Set();
-  let settings = [], missed = false, changedOnly = false; // missed: they have not come
+  let settings = [], missed = false, changedOnly = false, fetches = 0; // missed: they have not come
   const part = () => numberIn("settings-part") || 0;
   const set = (key, value, typed) => {
     const of = part();
@@ -42,25 +35,26 @@ export function settingsPanel() {
   const sought = () => $("search-settings").value.toLowerCase().split(/\s+/).filter(Boolean).map(stem);
   const shown = (setting) => {
     const marked = setting.changed || wrongs.has(setting.key), words = sought();
-    if (changedOnly) return marked && hasWords(setting, words);
-    return words.length ? hasWords(setting, words) : marked || LEVELS.indexOf(setting.level) <= LEVELS.indexOf(kept.now.level);
+    if (changedOnly || words.length) return (marked || !changedOnly) && hasWords(setting, words);
+    return marked || LEVELS.indexOf(setting.level) <= LEVELS.indexOf(kept.now.level);
   };
   const list = () => {
     const words = sought(), rows = settings.filter(shown).sort((a, b) => farFrom(a, words) - farFrom(b, words)), changed = settings.filter((setting) => setting.changed), open = changedOnly || words.length > 0;
     if (changedOnly && !changed.length) return showChanged(false);
-    tell({ "settings-count": rows.length ? `${rows.length} of ${settings.length} settings` : "No setting has these words.", "only-changed": `${changed.length} changed` });
+    tell({ "settings-count": rows.length ? `${rows.length} of ${settings.length} settings` : "No setting matches.", "only-changed": `${changed.length} changed` });
     disable({ "only-changed": !changed.length, "reset-settings": !changed.length });
     tellTakeBack(changed, part());
     for (const level of LEVELS) pressed(`level-${level}`, kept.now.level === level);
     const groups = groupedBy(rows, ({ group }) => group);
     putRows([...groups].flatMap(([group, own]) => {
       const folded = !open && kept.now.folded.includes(group), title = groupTitle(own, folded, () => { fold(group, !folded); });
-      const row = (setting) => ({ id: setting.key, told: JSON.stringify([setting, wrongs.get(setting.key)]), make: () => settingRow(setting, { wrong: wrongs.get(setting.key), set, again: list, explained }) });
+      const row = (setting) => ({ id: setting.key, told: JSON.stringify([setting, wrongs.get(setting.key), kept.now.level]), make: () => settingRow(setting, { wrong: wrongs.get(setting.key), set, again: list, explained }) });
       return [title, ...(folded ? [] : own.map(row))];
     }), $("settings-list"));
   };
-  const fold = (group, folded) => {
-    kept.keep({ folded: [...kept.now.folded.filter((name) => name !== group), ...(folded ? [group] : [])] });
+  const fold = (group, folded) => keep({ folded: [...kept.now.folded.filter((name) => name !== group), ...(folded ? [group] : [])] });
+  const keep = (shown) => {
+    kept.keep(shown);
     list();
   };
   const showChanged = (only) => {
@@ -69,10 +63,9 @@ export function settingsPanel() {
     list();
   };
   const fetchAll = async () => {
-    const asked = part(), answer = await fetch(`settings.json?part=${asked}`).catch(() => null);
-    missed = !answer; // the line is lost: the next state asks again
-    if (!answer?.ok || asked !== part()) return;
-    const told = await answer.json();
+    const number = ++fetches, told = await fetch(`settings.json?part=${part()}`).then((answer) => (answer.ok ? answer.json() : {}), () => null);
+    missed = !told; // the line is lost: the next state asks again
+    if (!told?.settings || number !== fetches) return; // a later question has the newer answer
     settings = told.settings;
     showProfiles(told.profiles);
     putNew($("command-line"), told.command, () => told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
@@ -82,18 +75,22 @@ export function settingsPanel() {
   const partsToChoose = ({ parts, part_settings: own, model }) => {
     const names = ["all parts", ...Array.from({ length: model ? Math.max(parts, 1) : 0 }, (_, k) => {
       const keys = own.find((ofPart) => ofPart.part === k + 1)?.keys.length || 0;
-      return `part ${k + 1}${keys ? ` (${keys} of its own)` : ""}`;
+      return `part ${k + 1}${keys ? ` (${keys} changed)` : ""}`;
     })];
     $("settings-part").replaceChildren(...optionsOf([...names.entries()], part() < names.length ? part() : 0));
   };
-  addEventListener("beforeinput", decimalComma);
+  addEventListener("beforeinput", (event) => { // a comma in a number is a decimal point: browsers drop it, and 0,35 would become 035
+    if (event.target.type !== "number" || !event.data?.includes(",")) return;
+    event.preventDefault();
+    document.execCommand("insertText", false, event.data.replace(",", "."));
+  });
   listen("input", { "search-settings": list });
   listen("change", { "settings-part": () => { wrongs.clear(); fetchAll(); } });
   listen("click", {
     "only-changed": () => showChanged(!changedOnly), "copy-command": () => copyText($("command-line"), $("copy-command")),
     "reset-settings": () => send(part() ? { do: "reset_part", part: part() } : { do: "reset" }),
   });
-  for (const level of LEVELS) listen("click", { [`level-${level}`]: () => { kept.keep({ level }); list(); } });
+  for (const level of LEVELS) listen("click", { [`level-${level}`]: () => keep({ level }) });
   for (const kind of KINDS) listen("click", { [`reset-${kind}`]: () => send({ do: "reset", kind }) });
   onNew(({ given, part_settings: own, parts, model, rotation, stops, copies }) => [given, own, parts, model?.name, rotation, stops, copies], () => {
     partsToChoose(store.state);
@@ -106,10 +103,10 @@ export function settingsPanel() {
 }
 
 function showProfiles(profiles) {
-  const rows = Object.entries(profiles).map(([kind, { names, name }]) => {
+  const rows = Object.entries(profiles).map(([kind, { labels, name }]) => {
     const onchange = ({ target }) => ask({ do: "profile", kind, name: target.value }, (refusal) => { if (refusal) target.value = name; });
-    const select = made("select", { onchange }, ...optionsOf(names.map((text) => [text, text]), name));
-    return { id: kind, told: JSON.stringify([names, name]), make: () => made("label", {}, kind, select) };
+    const select = made("select", { onchange, title: name }, ...optionsOf(Object.entries(labels), name));
+    return { id: kind, told: JSON.stringify([labels, name]), make: () => made("label", {}, kind, select) };
   });
   putRows(rows, $("profiles-list"));
 }
@@ -139,10 +136,10 @@ function tellTakeBack(changed, part) {
   const counts = groupedBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
   for (const kind of KINDS) {
     const count = counts.get(kind)?.length || 0;
-    tell({ [`reset-${kind}`]: `Those of the ${kind} (${count})` });
+    tell({ [`reset-${kind}`]: `Reset the ${kind} (${count})` });
     hide({ [`reset-${kind}`]: part > 0 || !count || counts.size < 2 });
   }
-  const all = part ? `Take back what part ${part} has of its own` : counts.size === 1 ? `Take the changes of the ${[...counts.keys()][0]} back` : "Take all changes back";
+  const all = part ? `Reset the settings of part ${part}` : counts.size === 1 ? `Reset the changes of the ${[...counts.keys()][0]}` : "Reset all changes";
   tell({ "reset-settings": `${all} (${changed.length})` });
 }
 
@@ -154,17 +151,11 @@ function groupTitle(own, folded, turn) {
 
 /** A text into the clipboard, or marked for the person to take where the browser allows no more. */
 async function copyText(element, button) {
-  const range = document.createRange();
-  range.selectNodeContents(element);
-  getSelection().removeAllRanges();
-  getSelection().addRange(range);
+  getSelection().selectAllChildren(element);
   const copied = await navigator.clipboard?.writeText(element.textContent).then(() => true, () => false);
-  button.textContent = copied ? "Copied" : "Marked: copy it by Ctrl+C";
+  button.textContent = copied ? "Copied" : "Selected: press Ctrl+C";
   setTimeout(() => { button.textContent = "Copy"; }, 3000);
 }
-
-/** A key that is broken between its words where it is too long for a line. */
-const breakable = (key) => key.split(/(?<=[._])/).flatMap((word, k) => (k ? [made("wbr"), word] : [word]));
 
 /** wrong: {text, typed}, what was refused last; set(key, value, typed) asks for a value, null: as it was; again(): called when a person
  * leaves what was typed in, for what has been told meanwhile; explained: the keys whose meaning is shown. */
@@ -180,20 +171,20 @@ function settingRow(setting, { wrong, set, again, explained }) {
     explain.ariaExpanded = String(!meaning.hidden);
     explained[meaning.hidden ? "delete" : "add"](key);
   };
-  const explain = button("?", turn, { title: meaning.textContent, ariaLabel: `${label}: what it means`, ariaExpanded: String(explained.has(key)) });
+  const explain = button("?", turn, { title: `${meaning.textContent} (${key})`, ariaLabel: `${label}: what it means`, ariaExpanded: String(explained.has(key)) });
   const named = made("details", { className: "placeholders", hidden: !placeholders.length }, made("summary", { text: "Placeholders" }), made("small", { text: placeholders.map((name) => `{${name}}`).join(" ") }));
-  const words = made("span", {}, label, made("small", { className: "key" }, ...breakable(key)));
+  const words = made("span", {}, label), breakable = key.split(/(?<=[._])/).flatMap((word, k) => (k ? [made("wbr"), word] : [word]));
+  if (kept.now.level !== "simple") words.append(made("small", { className: "key" }, ...breakable));
   const typed = made("div", { className: "typed" }, made("label", {}, words, input, made("span", { className: "unit", text: unit })), explain, back);
   const row = made("div", { className: changed ? "setting changed" : "setting" }, typed, refused, made("small", { className: "was", text: was, hidden: !changed }), meaning, named);
-  const left = () => {
-    const begun = Boolean(row.dataset.typing);
-    delete row.dataset.typing;
-    return begun;
-  };
   row.dataset.key = key;
   input.addEventListener("input", () => { row.dataset.typing = kind; });
-  input.addEventListener("change", () => { set(key, typedIn(input, setting), kind === "boolean" ? input.checked : input.value); left(); });
-  input.addEventListener("blur", () => { if (left()) again(); });
+  input.addEventListener("change", () => { set(key, typedIn(input, setting), kind === "boolean" ? input.checked : input.value); delete row.dataset.typing; });
+  input.addEventListener("blur", () => {
+    if (!row.dataset.typing) return;
+    delete row.dataset.typing;
+    again();
+  });
   return row;
 }
 
@@ -205,9 +196,9 @@ function meaningOf({ meaning, least, most }) {
 
 /** What a key has without the change, where that is short enough to be read. */
 function wasOf({ unchanged, unit, kind }) {
-  if (kind === "block" || kind === "rows") return "Take the profile's own back";
+  if (kind === "block" || kind === "rows") return "Reset to the profile";
   const value = unchanged === null || unchanged === "" ? "nothing" : unchanged === true ? "on" : unchanged === false ? "off" : `${unchanged} ${unit}`.trim();
-  return `The profile has ${value}`;
+  return `Profile value: ${value}`;
 }
 
 function inputOf({ kind, choices, least, most }, value) {

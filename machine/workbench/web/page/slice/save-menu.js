@@ -11,14 +11,14 @@ const SECTIONS_OF = { machine: ["machine"], material: ["material"], process: ["p
 function entriesOf({ lacking, sliced, compared, given }) {
   const profiles = Object.entries(SECTIONS_OF).map(([kind, sections]) => {
     const count = given.settings.filter((setting) => sections.includes(setting.split(".")[0].trim())).length, name = given[kind].split(/[\\/]/).at(-1);
-    return [kind, [count ? "" : `nothing of ${name} is changed`, `${name} with ${count} change${count === 1 ? "" : "s"}, to be dropped here again`]];
+    return [kind, [count ? "" : `no setting of ${name} is changed`, `${name} with ${count} change${count === 1 ? "" : "s"}, to open here again`]];
   });
   return {
-    project: [lacking.model, "3MF with model, parts, marks and profiles, to be dropped here again, on another computer, too"],
-    plan: [lacking.parts, "how the model lies and is cut, to be dropped here again"], parts: [lacking.parts, "zip of an STL each, a coloured 3MF and the plan"],
+    project: [lacking.model, "3MF with model, parts, marks and profiles, to open here or on another computer"],
+    plan: [lacking.parts, "orientation and cuts, to open here again"], parts: [lacking.parts, "zip of an STL file for each part, a coloured 3MF and the plan"],
     pictures: [lacking.parts, "zip of PNGs: the parts, the print order, every number of parts"],
-    gcode: [lacking.slices, sliced?.errors.length ? "the dry run found errors: asks before it saves" : "for the printer"],
-    page: [lacking.slices, `one HTML file to open anywhere${compared.length ? ", with the comparison" : ""}`], ...Object.fromEntries(profiles),
+    gcode: [lacking.slices, sliced?.errors.length ? "the dry run found errors: confirm before saving" : "for the printer"],
+    page: [lacking.slices, `one HTML file that opens anywhere${compared.length ? ", with the comparison" : ""}`], ...Object.fromEntries(profiles),
   };
 }
 
