@@ -8,7 +8,7 @@ import re
 from collections import defaultdict
 from typing import Any
 
-from machine.link.protocol.states import TABLE, Signal, State
+from machine.link.protocol.states import TABLE, State
 from profiles.profile import SECTIONS, load
 from profiles.wording import allowed, keys
 from tools.docs.harness import DOCS, marked
@@ -77,15 +77,11 @@ def diagram() -> str:
     for state, row in TABLE.items():
         leads: dict[State, list[str]] = defaultdict(list)
         for signal, target in row.items():
-            leads[target].append(_word(signal))
+            leads[target].append(signal.name.lower().replace("_", " "))
         lines += [f"    {state.name} --> {target.name}: {', '.join(words)}" for target, words in leads.items()]
     lines += [f"    {state.name} --> [*]" for state, row in TABLE.items() if not row]
     lines.append("```")
     return "\n".join(lines) + "\n"
-
-
-def _word(signal: Signal) -> str:
-    return signal.name.lower().replace("_", " ")
 
 
 def page(text: str) -> str:
