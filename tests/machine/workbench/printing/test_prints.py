@@ -408,6 +408,7 @@ def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.Monke
             assert job.state == state
             job.state = "idle"
             current = Attended(wanted)
+        current.until(lambda state: state["status"].temperature.nozzle_c)
         current.person.hear(Command.EMERGENCY_STOP)
         assert current.ended().sentence.startswith(stopped.format(address))
         assert job.halted
@@ -493,7 +494,7 @@ def test_an_emergency_stop_is_given_whatever_else_a_page_sends(number: dict[str,
     assert stopped == [1]
 
 
-GIVEN = {"percent": 100, "does": "heat"}
+GIVEN = {"percent": 100, "by_mm": 0.1, "does": "heat"}
 
 
 @pytest.mark.parametrize(
