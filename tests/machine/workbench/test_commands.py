@@ -35,6 +35,7 @@ ANYTHING = {
     "kind": "pause",
     "min_mm": [0, 0, 0],
     "max_mm": [1, 1, 1],
+    "faces": "",
 }
 WITHOUT_A_MODEL = {"close_gcode", "demo", "undo", "redo", "set", "reset", "profile", "stop", "dismiss", "unit"}
 UNSLICED = "what is on the workbench is not sliced yet: slice it first"
@@ -44,16 +45,15 @@ PAGE = resources.files("machine.workbench.web").joinpath("page")
 
 def bare(bench: Bench) -> Any:
     """A session on whose bench nothing is sliced, and which can do nothing."""
-    return SimpleNamespace(
-        bench=bench, stopped="", forget_problem=lambda: None, slicing=SimpleNamespace(lacking=lambda: UNSLICED)
-    )
+    return SimpleNamespace(bench=bench, note="", forget_problem=lambda: None, slicing=SimpleNamespace(lacking=lambda: UNSLICED))
 
 
 @pytest.mark.parametrize("name", sorted({*COMMANDS} - WITHOUT_A_MODEL))
 def test_all_that_is_done_to_a_model_is_refused_without_one(name: str) -> None:
     with pytest.raises(PlanError, match="there is no model on the workbench yet: choose a file first"):
         perform(
-            bare(Bench(load())), *read_command({"do": name, **ANYTHING, **({"kind": "keep"} if "mark" in name else {})}, COMMANDS)
+            bare(Bench(load())),
+            *read_command({"do": name, **ANYTHING, **({"kind": "keep"} if "mark" in name or name == "brush" else {})}, COMMANDS),
         )
 
 
