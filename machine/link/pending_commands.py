@@ -20,7 +20,7 @@ from profiles.errors import LocalProtocolError
 MOST_AT_ONCE = 16  # requests taken per turn: a flood of requests must not hold up the print
 # Marlin allows 10 to 999 per cent; beyond 300 the planner starves, beyond 200 the extruder slips.
 FEED_PERCENT, FLOW_PERCENT = (10.0, 300.0), (10.0, 200.0)
-MOST_OFFSET_MM = 2.0  # the whole Z offset of a print: what is farther off wants homing anew
+MOST_OFFSET_MM = 2.0  # the whole Z offset of a print: an error beyond this is one of homing
 
 
 class Command(Enum):
@@ -32,7 +32,7 @@ class Command(Enum):
     EMERGENCY_STOP = auto()
     FEED = auto()  # value: per cent of the programmed feed rates
     FLOW = auto()  # value: per cent of the programmed filament
-    BABYSTEP = auto()  # value: mm by which the tip goes up from here on, along the tool: machine Z, however the table is tilted
+    BABYSTEP = auto()  # value: mm by which to raise the tip along the tool: machine Z, however the table is tilted
     LINE = auto()  # text: a line of G-code from the user
 
 

@@ -56,16 +56,16 @@ class Outputs:
 
 @dataclass(frozen=True)
 class ModelRequest:
-    """A model or a G-code file and what is to be made of it.
+    """A model or a G-code file and what to make of it.
 
-    chosen_sections: those of the profile that the user has named, which a G-code file's own do not replace. orient: lay the
-    model down in the cheapest orientation; None: where nothing says how it lies. plans: files whose planes are cut instead of a
-    search, one for each model that has one; parts: the most parts; planes: file of planes by hand that the search starts from.
-    compare: with the same model in one part. force: go on although the dry run found errors. profile_names, settings: machine,
-    material and process as the user has given them, names or files, and KEY=VALUE over them. project: the project file that the
-    model comes from; own_marks: the boxes that the model's own file marks count beside those of the plan, which has them else.
-    stops: where the print waits for a person. copies: the number of each model on the plate; beside: the other models there.
-    plate: of each model's slicer file; None: the first that holds something. verbose: tell what the search has tried, too.
+    chosen_sections: sections of the profile named by the user, which take precedence over a G-code file's own. orient: search for
+    the cheapest orientation; None: if nothing else gives one. plans: files whose planes are cut instead of a search, at most one
+    per model; parts: the most parts; planes: file of user-defined planes that the search starts from. compare: with the same
+    model in one part. force: continue although the dry run found errors. profile_names, settings: the user's machine, material
+    and process, names or files, and KEY=VALUE over them. project: the project file of the model; own_marks: the boxes marked in
+    the model's file count beside those of the plan, which otherwise includes them. stops: where the print waits for the user.
+    copies: of each model on the plate; beside: the other models there. plate: of each model's slicer file; None: the first that
+    is not empty. verbose: also report the cuts that the search has tried.
     """
 
     model: str

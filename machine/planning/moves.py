@@ -19,7 +19,7 @@ RICHER = 1.004  # greatest ratio of a short stroke's filament to the planned, du
 
 @dataclass(frozen=True)
 class BeginPart:
-    """Start of part `index` at `pose`; a Reorient has turned the table before.
+    """Start of part `index` at `pose`; an earlier Reorient has turned the table.
 
     unsupported: places of it without possible support.
     """

@@ -1,6 +1,6 @@
 """Print history: which prints have ended, how, and how long they took, in a file of the state folder.
 
-A print has two lines: one when it begins, one when it ends. A print without the second line was killed, or goes on.
+A print has two lines: one when it begins, one when it ends. A print without the second line was killed or is still running.
 """
 
 import json
@@ -49,7 +49,7 @@ def past_prints() -> list[dict[str, Any]]:
 
 
 def _past(record: dict[str, Any]) -> dict[str, Any] | None:
-    """A print as pages get it; None for one that goes on, for one that was not wanted, and where the record is damaged."""
+    """A print as pages get it; None for one that is still running, for a declined one, and for a damaged record."""
     try:
         past = {key: record[key] for key in ("name", "port", "begun")}
         past["outcome"] = record.get("outcome", PrintState.FAILED.value)

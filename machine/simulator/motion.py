@@ -198,7 +198,7 @@ class Motion:
             self.planner.add(block, self.jerk_mm_s, now_s)
 
     def shift_z(self, by_mm: float) -> None:
-        """A baby step: every position is that much higher from here on."""
+        """A baby step: raise every later position by this much."""
         self._offset[2] += by_mm
 
     def _seconds(self, here: Sequence[float], destination: Sequence[float]) -> float:

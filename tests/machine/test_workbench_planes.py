@@ -61,8 +61,8 @@ def test_a_plane_snaps_to_the_neck_nearby_and_where_there_is_none_that_is_told(b
         page.do("neck", part=2)
         problem = page.until(lambda state: state["problem"])["problem"]
         assert (
-            problem
-            == "there is no neck near the plane of part 2: within 10 mm and 25 degrees no rim is shorter than all around it"
+            problem == "there is no neck near the plane of part 2: "
+            "within 10 mm and 25 degrees no section is narrower than its surroundings"
         )
 
 

@@ -64,7 +64,7 @@ def decompose(request: ModelRequest) -> int:
 
 
 def _verdict(request: ModelRequest, decomposition: Decomposition) -> str:
-    """What the parts leave to support, and the command that goes on from here."""
+    """The area that needs support in the parts, and the command that exports them."""
     plan = request.outputs.plan or request.plan or (request.outputs.folder and request.outputs.folder / PLAN)
     by_plan = f" --plan {plan}" if plan else ""
     return (

@@ -39,10 +39,10 @@ OnStatus = Callable[[PrintStatus, str], None]  # with a message for the user, ""
 
 @dataclass(eq=False)
 class Follower:
-    """Has a file printed that a server holds, and follows that to its end: run() once.
+    """Starts a file on a server and follows its print to the end: call run() once.
 
-    size: of the file, bytes, 0: not known; left(): whether the person has gone away. running: an active status of the print that
-    the server is at already, which is not to be started. babystep: its firmware's command for {} mm, "": not known.
+    size: of the file, bytes, 0: unknown; left(): whether the user has left. running: active status of a print that is already
+    running and is not to be started. babystep: its firmware's command for {} mm, "": not known.
     """
 
     server: PrintServer
@@ -68,7 +68,7 @@ class Follower:
         self._shown: tuple[PrintStatus | None, str] = (None, "")
         self._shown_s = 0.0
         self._percents: dict[Command, float] = {}  # ordered values: not every server reports them
-        self._offset_mm = 0.0  # asked for so far
+        self._offset_mm = 0.0  # requested in total
 
     def run(self) -> PrintState:
         """Follow the print to DONE, CANCELLED, LEFT, or FAILED after an emergency stop.

@@ -54,7 +54,7 @@ PHRASES = {
 
 
 def page_words(message: str) -> str:
-    """The message with the page's fields in the place of options, and labels in that of keys.
+    """The message with the page's fields in place of options, and labels in place of keys.
 
     >>> from profiles.messages import advice, key_name
     >>> page_words(f"{key_name('process.walls')} is -3: it must be a whole number from 0 to 50")

@@ -80,7 +80,7 @@ def check_number(key: str, value: int, least: int, most: int) -> int:
 
 
 def with_value(whole: Whole, name: str, value: object) -> Whole:
-    """The same dataclass with another value of one field, named at run time."""
+    """A copy of a dataclass with another value of one field, named at run time."""
     change: dict[str, Any] = {name: value}
     return replace(whole, **change)
 

@@ -229,7 +229,7 @@ class AtPage:
 
     @contextmanager
     def progress(self) -> Iterator[Report]:
-        """The progress of work before the print, told only while it lasts."""
+        """Report the progress of work before the print, only while it lasts."""
         try:
             yield lambda text, share=None: self.tell(said=(*self._lines, marked_line(text)))
         finally:

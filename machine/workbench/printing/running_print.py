@@ -129,7 +129,7 @@ class RunningPrint:
         self.say((Command.FLOW, float(percent)))
 
     def babystep(self, *, by_mm: Babystep) -> None:
-        """Raise the tip along the tool by so many mm, below 0 lower it; on a table that tilts the tool is machine Z, too."""
+        """Raise the tip along the tool by a distance, mm, or lower it (below 0). The tool is machine Z on tilting tables, too."""
         self.say((Command.BABYSTEP, by_mm))
 
     def by_hand(self, *, does: HandWord, axis: str = "", by_mm: float = 0.0, keep_heat: bool = False) -> None:

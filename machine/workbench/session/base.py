@@ -147,7 +147,7 @@ class SessionBase(Observable):
         self.advance(self.history.do(word, bench), lost)
 
     def advance(self, history: History, lost: str = "") -> None:
-        """Go on with another history; a step forth tells what it has removed."""
+        """Replace the history; a step forward reports what it has removed."""
         forth = history.before[-1:] == (self.history.now,)
         self.problems.clear()  # they were about the previous bench
         self.note = ""
@@ -160,7 +160,7 @@ class SessionBase(Observable):
         self._tell_problem("; ".join(filter(None, (self.problems.get(asking.get(), ""), sentence))))
 
     def add_note(self, sentence: str) -> None:
-        """Tell all pages what has changed, beside what they are told already."""
+        """Add a sentence about a change to the note on all pages."""
         self.note = "; ".join(filter(None, (self.note, sentence)))
 
     def _tell_problem(self, sentence: str) -> None:

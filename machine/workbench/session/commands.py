@@ -47,12 +47,12 @@ def check_need(session: Session, need: Need) -> None:
 
 
 def undo(session: Session, *, count: int = 1) -> None:
-    """So many steps back; as many as there are where that is less."""
+    """Undo a number of steps, or all of them if there are fewer."""
     session.advance(session.history.undo(count))
 
 
 def redo(session: Session, *, count: int = 1) -> None:
-    """The same forward again."""
+    """Redo a number of steps, or all of them if there are fewer."""
     session.advance(session.history.redo(count))
 
 

@@ -90,8 +90,8 @@ class Keeping:
         return self._trouble
 
     async def put_away(self) -> str:
-        """Make earlier work of what lies on the bench, which is kept elsewhere from then on. A sentence says so, "" where nobody
-        has done anything that would be missed, or it could not be kept."""
+        """Keep the bench as earlier work; later changes are kept elsewhere. Returns a sentence about that, "" if the bench has no
+        work worth keeping, or it could not be kept."""
         bench = self._session.bench
         if not bench.worked_on or bench.model is None:
             return ""

@@ -21,9 +21,9 @@ ENDED = "slicing was stopped, for the model on the workbench has changed: slice 
 
 
 class Finding(Derived[Found]):
-    """A search ends whose model is gone or lies otherwise, or whose settings, marks or locked planes are others now.
+    """Search for parts, cancelled when the model, its orientation, settings, marks or locked planes change.
 
-    laid: how it found the model turned, and how it has turned it."""
+    laid: the rotations before and after it."""
 
     def __init__(self, session: SessionBase) -> None:
         self.laid: tuple[tuple[Vector, ...], tuple[Vector, ...]] | None = None
@@ -87,7 +87,7 @@ def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
 
 
 def price_by_hand(session: SessionBase) -> Derived[FrontRow | None]:
-    """The row of planes that a person has changed since they were found; None where they cannot be cut."""
+    """The row of planes that the user has changed since they were found; None if they cannot be cut."""
 
     def decides(bench: Bench) -> tuple[object, ...] | None:
         is_found = bench.cuts is None or any(planned_parts(row) == bench.cuts for row in bench.rows)

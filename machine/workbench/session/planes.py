@@ -208,7 +208,7 @@ class PlaneTrials:
             self.trial = tried = bench, cuts, trial
 
     def _uncut(self, bench: Bench) -> tuple[object, ...] | None:
-        """What decides which area needs support in one piece; None where it is not worked out by itself."""
+        """The state that determines the area that needs support in one piece; None if it is not computed automatically."""
         return None if bench.model is None or bench.model.faces > MANY_FACES else bench.sought
 
     async def _try_uncut(self, bench: Bench) -> float:

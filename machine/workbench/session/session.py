@@ -109,10 +109,8 @@ class Session(SessionBase):
             self.start(tasks.warm())
 
     async def open_model(self, path: Path, name: str, anew: bool = True, plate: int | None = None) -> None:
-        """Put the model of a file on the bench. anew: without the scale, the turns and the place that were set for the one before
-        it; plate: of a slicer file.
-
-        Raises UserError as the command line tells it; where its size is none that a printer makes, a page is asked for its unit.
+        """Put the model of a file on the bench. `anew`: drop the scale, rotation and place set for a previous model; plate: of a
+        slicer file. Raises UserError with the command line's message; if the size suggests a wrong unit, it requests the unit.
         """
         self.readiness.load()
         if self.bench.model is not None and self.bench.model.faces > MANY_FACES:
@@ -127,7 +125,7 @@ class Session(SessionBase):
         self.do(word, bench, await self.keeping.put_away())
 
     async def open_gcode(self, path: Path, name: str) -> None:
-        """Dry-run a G-code file, to be looked at and printed whatever lies on the bench. Raises UserError."""
+        """Dry-run a G-code file for display and printing, independent of the bench. Raises UserError."""
         request = ModelRequest(str(path), self.bench.profile.of_all_parts)
         with self.waiting(f"reading {name}"):
             opened = await self.quick.run(open_gcode, request, self.new_file(), self.new_file())

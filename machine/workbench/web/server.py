@@ -84,7 +84,7 @@ async def print_page(session: Session, request: Request) -> Response:
 
 
 async def print_text(session: Session, request: Request) -> Response:
-    """The same as G-code to look at, whatever the dry run found."""
+    """The G-code of the last slices for display, whatever the dry run found."""
     sliced = _sliced(session, request)
     return _gone() if sliced is None else FileResponse(sliced.gcode, media_type="text/plain")
 
@@ -118,7 +118,7 @@ async def gcode(session: Session, request: Request) -> Response:
 
 
 def _sliced(session: Session, request: Request) -> Sliced | None:
-    """The last slices, or the G-code file that is open, where they are those that are asked for."""
+    """The last slices or the open G-code file, whichever has the requested key; None for neither."""
     slices, key = session.slicing.latest(), request.path_params["key"]
     there = [session.gcode, None if slices is None else slices.sliced]
     return next((sliced for sliced in there if sliced is not None and sliced.key == key), None)

@@ -226,7 +226,7 @@ def _resting(session: Session) -> list[dict[str, Any]]:
 
 
 def _words(steps: Sequence[Step]) -> list[str]:
-    """What the last steps of a history did, the nearest first."""
+    """The words of the last steps of a history, the latest first."""
     return [terminal_words(step.word) for step in steps[::-1][:MOST_STEPS_LISTED]]
 
 

@@ -84,7 +84,7 @@ class Uploads:
         return await self._open(session, path.name, copy_to)
 
     async def remove_left(self, session: Session, request: Request) -> Response:
-        """The same removed."""
+        """Remove a file left behind."""
         await asyncio.to_thread(remove_file, self._left_file(request))
         return JSONResponse({})
 
@@ -119,7 +119,7 @@ class Uploads:
         return JSONResponse({})
 
     async def remove_kept(self, session: Session, request: Request) -> Response:
-        """The same removed."""
+        """Remove a folder of kept work."""
         folder = _kept_folder(request)
         lock = lock_folder(folder)
         if lock is None:
@@ -178,7 +178,7 @@ class Uploads:
 
 
 def _kept_folder(request: Request) -> Path:
-    """The folder of kept work that is asked for. Raises PlanError."""
+    """The requested folder of kept work. Raises PlanError."""
     name = request.path_params["name"]
     folder = next((folder for folder in folders_kept() if folder.name == name), None)
     if folder is None:

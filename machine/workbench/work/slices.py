@@ -141,8 +141,8 @@ def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
 
 
 def open_gcode(tell: Tell, request: ModelRequest, page: Path, gcode: Path) -> Sliced:
-    """A G-code file, dry-run as `view` and `print` do it, written to these files; the machine is that which it tells itself, else
-    that of the request. Raises GcodeError."""
+    """Dry-run a G-code file as `view` and `print` do, and write these files. The machine is the file's own or else that of the
+    request. Raises GcodeError."""
     loaded = load_program(request)
     program, profile = loaded.program, loaded.profile
     if not len(program.run.program.line):

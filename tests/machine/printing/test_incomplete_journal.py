@@ -83,9 +83,8 @@ def fails(number: int, after: int = 0, times: float = 1e9) -> Callable[[Path, py
     return lambda path, monkeypatch: FailingDisk(monkeypatch, path, after, number, times)
 
 
-def deleted(journal: Path) -> None:
-    """The journal is taken away, and its thread, which looks for it every SYNC_S, has time to see that."""
-    journal.rename(journal.with_name("elsewhere"))
+def seen_by_its_thread(action: object) -> None:
+    """Give the journal's thread, which syncs every SYNC_S, time to notice what was done."""
     sleep(20 * journal_module.SYNC_S)
 
 
@@ -93,8 +92,10 @@ DISKS = {
     "no write succeeds any more": fails(errno.EIO),
     "it is read-only from now on": fails(errno.EROFS),
     "one write is cut short": fails(FailingDisk.SHORT, times=1),
-    "one sync fails": lambda path, monkeypatch: FailingDisk(monkeypatch, path, 0, errno.EIO, 1, of=("fsync",)),
-    "the journal is deleted": lambda path, monkeypatch: deleted(path),
+    "one sync fails": lambda path, monkeypatch: seen_by_its_thread(
+        FailingDisk(monkeypatch, path, 0, errno.EIO, 1, of=("fsync",))
+    ),
+    "the journal is deleted": lambda path, monkeypatch: seen_by_its_thread(path.rename(path.with_name("elsewhere"))),
 }
 
 

@@ -46,9 +46,7 @@ PAGE = resources.files("machine.workbench.web").joinpath("page")
 
 def bare(bench: Bench) -> Any:
     """A session on whose bench nothing is sliced, and which can do nothing."""
-    return SimpleNamespace(
-        bench=bench, stopped="", forget_problem=lambda: None, slicing=SimpleNamespace(lacking=lambda: UNSLICED)
-    )
+    return SimpleNamespace(bench=bench, note="", forget_problem=lambda: None, slicing=SimpleNamespace(lacking=lambda: UNSLICED))
 
 
 @pytest.mark.parametrize("name", sorted({*COMMANDS} - WITHOUT_A_MODEL))

@@ -70,7 +70,7 @@ def test_earlier_prints_are_listed_with_outcome_time_and_filament_where_there_ar
     killed = "{ name: 'tee', outcome: 'failed', begun: 0, seconds: null, filament_m: null }"
     cells = on_fake_page(f"return [{done}, {killed}].map((past) => modules['print/print-shown'].pastCells(past).slice(0, 4));")
     assert cells == [["box", "done", "1h 30m", "1.3 m"], ["tee", "failed", "–", "–"]]
-    shown = "$('history-field').hidden, $('history').children.length"
+    shown = "$('history-field').hidden, $('past-prints').children.length"
     told = "fake.sockets[0].tell({ ports: null, asking: false, journals: null, prints: [], history: "
     assert on_fake_page(f"{PAGE} {told}[] }}); return [{shown}];") == [True, 0]
     assert on_fake_page(f"{PAGE} {told}[{done}] }}); return [{shown}];") == [False, 2]

@@ -477,7 +477,7 @@ def test_a_stop_ends_a_comparison_that_still_waits_for_its_turn() -> None:
         await settled(session)
 
     session = when_done(work)
-    assert (session.stopped, session.problem) == ("The comparison was stopped: nothing of it is kept.", "")
+    assert (session.note, session.problem) == ("The comparison was stopped: nothing of it is kept.", "")
 
 
 @pytest.mark.parametrize("given", [{}, {"ranker": ""}, {"ranker": "  "}, {"ranker": " classic "}])

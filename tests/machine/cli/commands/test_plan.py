@@ -44,7 +44,7 @@ def test_the_plan_in_the_folder_gives_the_same_parts_and_stays_as_it_is(folder: 
     edited = "# my own remark\n" + Path("a/plan.toml").read_text()
     Path("a/plan.toml").write_text(edited)
     _run("decompose", "tee.stl", "--plan", "a/plan.toml", "-o", "b")
-    assert "cut by a plan in" in capsys.readouterr().out
+    assert "tiltprint export tee.stl --plan a/plan.toml makes the G-code" in capsys.readouterr().out
     assert [Path(f"a/{name}").read_bytes() for name in PARTS] == [Path(f"b/{name}").read_bytes() for name in PARTS]
     assert json.loads(Path("b/decomposition.json").read_text())["candidates_evaluated"] == 0
     again = Path("b/plan.toml").read_text()

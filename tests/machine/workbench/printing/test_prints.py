@@ -408,6 +408,7 @@ def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.Monke
             assert job.state == state
             job.state = "idle"
             current = Attended(wanted)
+        current.until(lambda state: state["status"].temperature.nozzle_c)
         current.person.hear(Command.EMERGENCY_STOP)
         assert current.ended().sentence.startswith(stopped.format(address))
         assert job.halted
