@@ -68,7 +68,6 @@ const STOP_KEY = "e", HOLD_MS = 600, TWICE_MS = 1000;
 function stopKey(stop) {
   let timer = 0, pressedAt = -Infinity;
   const release = () => {
-    clearTimeout(timer);
     delete $("emergency").dataset.held;
   };
   const finish = () => {
@@ -88,7 +87,8 @@ function stopKey(stop) {
   };
   return (window) => {
     window.addEventListener("keydown", press, true);
-    for (const end of ["keyup", "blur"]) window.addEventListener(end, release);
+    window.addEventListener("keyup", ({ key }) => { if (key?.toLowerCase() === STOP_KEY) release(); });
+    window.addEventListener("blur", release);
   };
 }
 
