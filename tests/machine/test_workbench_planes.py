@@ -62,7 +62,7 @@ def test_a_plane_snaps_to_the_neck_nearby_and_where_there_is_none_that_is_told(b
         problem = page.until(lambda state: state["problem"])["problem"]
         assert (
             problem
-            == "there is no neck near the plane of part 2: within 10 mm and 25 degrees no rim is shorter than all around it"
+            == "there is no neck near the plane of part 2: within 10 mm and 25 degrees no section is narrower than its surroundings"
         )
 
 
