@@ -6,6 +6,12 @@ export const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
 export const newtons = (force) => `${Number(force.toPrecision(2))} N`;
 export const clock = (seconds, form = {}) => new Date(1000 * seconds).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", ...form });
 
+/** A time of today, or a date and a time. */
+export function moment(seconds) {
+  const at = new Date(1000 * seconds);
+  return at.toDateString() === new Date().toDateString() ? clock(seconds) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
+}
+
 /** A value into a field, but for one that somebody types in. */
 export const fill = (field, value) => { if (document.activeElement !== field) field.value = value; };
 

@@ -85,14 +85,14 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
 function onlyWithLine({ state, line }) {
   const none = line !== "open";
   document.querySelectorAll("#panel > section:not(#printing) fieldset").forEach((fields) => { fields.disabled = none; });
-  disable({ undo: none || !state.undo, redo: none || !state.redo, save: none, again: none, "put-near": none });
+  disable({ undo: none || !state.undo, redo: none || !state.redo, save: none, again: none });
 }
 
 /** What could not be done last, for as long as it is so or until it is read. */
 function problemLine() {
   onState(({ problem, refused, units }) => {
     putNew($("problem"), problem, () => withWholeOptions(problem)); // read aloud once
-    hide({ problem: !problem, "put-near": !refused?.near });
+    hide({ problem: !problem, "put-near": !refused?.near, "put-aside": !refused });
     putNew($("units"), units?.words || [], () => (units?.words || []).map((unit) => button(`in ${unit}`, () => send({ do: "unit", unit }))));
   });
 }

@@ -1,7 +1,7 @@
 // Print shown: a print's checks, its progress and its end, the bar on every tab, what is told outside the page, and its printer: by hand, by its camera, in a graph.
 
 import { $, duration, hide, listen, onData, optionsOf, roughly, rowOf, tell } from "../../../../view/template/elements.js";
-import { clock, listIn, putNew, putTable, tellIn } from "../lists.js";
+import { clock, listIn, moment, putNew, putTable, tellIn } from "../lists.js";
 import { keptInTab } from "../store.js";
 
 const SILENT_MS = 5000; // a print that goes on is told five times a second
@@ -120,8 +120,7 @@ export function showProgress(print) {
 
 /** What is told of a print of before, in this order. */
 export const pastCells = ({ name, outcome, seconds, filament_m: metres, begun }) => [
-  name, outcome, seconds == null ? "–" : roughly(seconds), metres == null ? "–" : `${metres.toFixed(1)} m`,
-  new Date(1000 * begun).toLocaleString([], { dateStyle: "short", timeStyle: "short" })];
+  name, outcome, seconds == null ? "–" : roughly(seconds), metres == null ? "–" : `${metres.toFixed(1)} m`, moment(begun)];
 
 export function showHistory(prints = []) {
   hide({ "history-field": !prints.length });

@@ -16,7 +16,7 @@ const NEEDS_PICTURE = ["brush", "faces", "box", "measure"];
 const WANTED = {
   lay: ["lay", () => "Click a lit face: it can rest on that."], snap: ["snap", () => "Click the face whose plane it is to take."],
   limb: ["limb", () => "Click the limb above the plane that is to come off alone; the others stay."],
-  brush: ["mark-brush", () => `Paint ${markWord()}; Shift or the right button erases, [ and ] change the circle; Esc ends it.`],
+  brush: ["mark-brush", () => `Paint where there is to be ${markWord()}; Shift or the right button erases, [ and ] change the circle; Esc ends it.`],
   faces: ["mark-faces", () => `Click where there is to be ${markWord()}; Esc ends it.`],
   box: ["mark-box", () => (store.corner ? "Now the opposite corner." : "Click a corner of the box.")],
   measure: ["measure", () => "Click two points; corners attract. Esc ends it."],

@@ -1,7 +1,6 @@
 // Measure: two points of the model, the distance between them, and the angle between the faces on which they lie.
 
 import { $, hide, tell } from "../../../../view/template/elements.js";
-import { HALF_HEIGHT } from "../../../../view/template/picture/camera.js";
 import { add, dot, length, RAD, scaled, sub } from "../../../../view/template/picture/math.js";
 import { store, subscribe } from "../store.js";
 import { cornersAt, facesAround } from "./face-tree.js";
@@ -16,8 +15,7 @@ function pointAt(event, picture) {
   const spot = met(event, picture);
   if (!spot) return null;
   const canvas = $("canvas"), { left, top } = canvas.getBoundingClientRect(), { corners } = store.triangles;
-  const pixel_mm = (2 * HALF_HEIGHT * length(sub(spot.place, picture.eye()))) / canvas.clientHeight;
-  const around = [...facesAround(store.triangles, spot.face, spot.at, SNAP_PIXELS * pixel_mm)].flatMap((face) => cornersAt(corners, face));
+  const around = [...facesAround(store.triangles, spot.face, spot.at, SNAP_PIXELS * picture.pixelAt(spot.place))].flatMap((face) => cornersAt(corners, face));
   const far = (at) => Math.hypot(...(picture.placeOf(picture.carried(at)) || [-99, -99]).map((x, k) => x - [event.clientX - left, event.clientY - top][k]));
   const nearest = around.reduce((best, at) => (far(at) < far(best) ? at : best));
   return far(nearest) <= SNAP_PIXELS ? { at: nearest, vertex: true } : spot;
