@@ -24,6 +24,7 @@ SHORT = {
     r"(-?[\d.]+) to (-?\d)": r"\1–\2",
     "true or false": "true/false",
     "^(a list of|one of|a|one) ": "",
+    "tables with the keys ": "tables of ",
     '"': "",
 }
 
