@@ -29,10 +29,7 @@ export function boxEdges(least, most) {
   return corners.flatMap((corner, k) => [1, 2, 4].filter((bit) => !(k & bit)).flatMap((bit) => [corner, corners[k | bit]]));
 }
 
-export const circle = (radius, z, steps) => Array.from({ length: steps }, (_, k) => {
-  const angle = (2 * Math.PI * k) / steps;
-  return [radius * Math.cos(angle), radius * Math.sin(angle), z];
-});
+export const circle = (radius, z, steps) => ringOf([0, 0, z], [0, 0, 1], radius, steps, Math.PI / 2); // from x on
 
 /** The surface of an outline [radius, z] turned about z. */
 function revolved(outline, steps = 64) {

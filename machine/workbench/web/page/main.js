@@ -14,14 +14,12 @@ import { apartPanel } from "./parts/pieces.js";
 import { handlesOf, obstacleOf, planesPanel } from "./parts/planes.js";
 import { printFrame } from "./print/print-frame.js";
 import { printPanel } from "./print/print-panel.js";
-import { titleOfModel } from "./print/print-shown.js";
-import { axesOf } from "./scene/axes.js";
+import { tellTitle } from "./print/print-shown.js";
 import { clicksOf, handsOf } from "./scene/clicks.js";
 import { pictureOf } from "./scene/picture.js";
-import { sectionView } from "./scene/section-view.js";
+import { axesOf, sectionView } from "./scene/views.js";
 import { settingsPanel } from "./settings/settings-panel.js";
-import { saveMenu } from "./slice/save-menu.js";
-import { comparePanel, slicesPanel, stopsPanel, wallsOf } from "./slice/slices-panel.js";
+import { comparePanel, saveMenu, slicesPanel, stopsPanel, wallsOf } from "./slice/slices-panel.js";
 import { keptLook, onNew, onState, store, subscribe, update } from "./store.js";
 
 function main() {
@@ -69,7 +67,7 @@ function main() {
 
 function tellState({ model, busy, undo, redo, search, slicing, preparing, machine, material, process }) {
   const root = document.documentElement;
-  titleOfModel(model ? model.name : "");
+  tellTitle({ model: model ? model.name : "" });
   const summary = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : preparing ? "preparing the model for planes …" : `${machine.name} · ${material} · ${process}`;
   tell({ title: model ? model.name : "tiltprint", summary });
   hide({ drop: Boolean(model || busy) });

@@ -133,7 +133,7 @@ export function placePanel(picture) {
 
 /** The knob at the model's foot. */
 function handleOf(picture) {
-  const knob = $("hand-place");
+  const knob = $("hand-place"), hold = (placing) => update({ placing }), stepOf = ({ shiftKey }) => (shiftKey ? LARGE_STEP_MM : STEP_MM);
   /** Where a hand is on the plate, from the middle of the model as it stands now; null: it looks above the plate's horizon. */
   const onPlate = (event) => {
     const [eye, along] = picture.sight(event);
@@ -141,16 +141,16 @@ function handleOf(picture) {
   };
   gripOf(knob, {
     take: (event) => {
-      const from = onPlate(event);
-      return from && { from, stood: placeNow() };
+      const from = onPlate(event), stood = placeNow();
+      let to = from;
+      return from && ((later) => {
+        to = onPlate(later) || to;
+        return rounded(stood.map((x, axis) => x + to[axis] - from[axis]), stepOf(later));
+      });
     },
-    move: ({ from, stood }, event) => {
-      const to = onPlate(event);
-      if (to) update({ placing: rounded(stood.map((x, axis) => x + to[axis] - from[axis]), event.shiftKey ? LARGE_STEP_MM : STEP_MM) });
-    },
+    hold, drop: () => hold(null),
     put: () => { if (store.placing) put(store.placing); },
-    drop: () => update({ placing: null }),
-    step: (sign, { key, shiftKey }) => update({ placing: WAYS[key].map((way, axis) => placeNow()[axis] + way * (shiftKey ? LARGE_STEP_MM : STEP_MM)) }),
+    step: (sign, event) => WAYS[event.key].map((way, axis) => placeNow()[axis] + way * stepOf(event)),
   });
   picture.drawn.push(() => {
     const shown = store.tab === "model" && store.state?.model && store.triangles && store.clicks !== "lay";

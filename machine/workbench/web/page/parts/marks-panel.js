@@ -150,12 +150,11 @@ function knobOf(side, picture) {
   gripOf(knob, {
     take: (event) => {
       const zone = boxNow(), along = alongWay(picture, sidePlace(zone, side), axesOf(zone)[side.axis], event);
-      return along && { zone, along };
+      return along && ((later) => withSide(zone, side, zone[side.end][side.axis] + along(later)));
     },
-    move: ({ zone, along }, event) => holdBox(withSide(zone, side, zone[side.end][side.axis] + along(event))),
+    hold: holdBox, drop: () => holdBox(null),
     put: () => { if (store.zoneHand) putBox(store.zoneHand); },
-    drop: () => holdBox(null),
-    step: (sign) => holdBox(withSide(boxNow(), side, boxNow()[side.end][side.axis] + sign * STEP_MM)),
+    step: (sign) => withSide(boxNow(), side, boxNow()[side.end][side.axis] + sign * STEP_MM),
   });
   return knob;
 }

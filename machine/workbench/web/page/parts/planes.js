@@ -161,13 +161,12 @@ export function handlesOf(picture) {
   const stepOf = ({ tilts }) => (tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * REACH * section.radius_mm);
   KNOBS.forEach((knob) => gripOf($(knob.id), {
     take: (event) => {
-      const along = alongWay(picture, placeOf(knob), planeNow().normal, event);
-      return along && { ...taken(knob), along };
+      const along = alongWay(picture, placeOf(knob), planeNow().normal, event), held = taken(knob);
+      return along && ((later) => moved(held, along(later)));
     },
-    move: (held, event) => holdPlane(moved(held, held.along(event))),
+    hold: holdPlane, drop: leavePlane,
     put: () => { if (store.hand) putPlane(store.hand.plane); },
-    drop: leavePlane,
-    step: (sign) => holdPlane(moved(taken(knob), sign * stepOf(knob))),
+    step: (sign) => moved(taken(knob), sign * stepOf(knob)),
   }));
   const place = () => {
     $("handles").hidden = !section || !planeNow() || isLocked();

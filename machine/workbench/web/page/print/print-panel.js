@@ -6,7 +6,7 @@ import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";
 import { putNew, withWholeOptions } from "../lists.js";
 import { onNew, onState, store, update } from "../store.js";
 import { followIn } from "./print-frame.js";
-import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showHistory, showPrint, showProgress, showWhich, silence, sure, titleOfPrints, webcamPanel } from "./print-shown.js";
+import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showHistory, showPrint, showProgress, showWhich, silence, sure, tellTitle, webcamPanel } from "./print-shown.js";
 
 /** What is chosen of a list whose last entry is another one, typed. */
 function chosenOr(name, typed) {
@@ -122,7 +122,7 @@ export function printPanel() {
     showHand(print(), commands());
     keepHeats(state.prints);
     showHeats(print());
-    titleOfPrints(running());
+    tellTitle({ share: running().at(-1)?.share });
     notifyOver(state.prints, OWN_PAGE);
     showBar(running(), print());
     stops.told();

@@ -137,22 +137,13 @@ export function showBar(running, looked) {
   $("emergency").dataset.print = shown.number;
 }
 
-let model = "", percent = null;
+const titled = { model: "", share: null };
 const heard = new Map(); // whether it runs, by the number of a print that this page commands
 
-const tellTitle = () => { document.title = [percent === null ? "" : `${percent} %`, model, "tiltprint"].filter(Boolean).join(" – "); };
-
-/** The model's name in the title. */
-export function titleOfModel(name) {
-  model = name;
-  tellTitle();
-}
-
-/** How far the newest print that runs is, in the title; null: none runs. */
-export function titleOfPrints(running) {
-  const share = running.at(-1)?.share;
-  percent = running.length && share != null ? Math.floor(100 * share) : null;
-  tellTitle();
+/** The tab's title has the model's name, and the share that is done of the newest print that runs; null: none runs. */
+export function tellTitle(news) {
+  const { model, share } = Object.assign(titled, news);
+  document.title = [share == null ? "" : `${Math.floor(100 * share)} %`, model, "tiltprint"].filter(Boolean).join(" – ");
 }
 
 /** Asked as a print begins, for a hand has just pressed a button: may the browser say when it is over? */

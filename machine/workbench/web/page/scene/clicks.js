@@ -7,18 +7,17 @@ import { openMenu } from "../parts/parts-panel.js";
 import { apartNow, pieceMet, shiftsOf } from "../parts/pieces.js";
 import { choosePart, cutLimb, partAt, snapTo } from "../parts/planes.js";
 import { store, subscribe, update } from "../store.js";
-import { brushOf } from "./brush.js";
-import { measureOf } from "./measure.js";
+import { brushOf, measureOf } from "./tools.js";
 import { met } from "./triangles.js";
 
 const NEEDS_PICTURE = ["brush", "faces", "box", "measure"];
-/** Of what a click can be for: the button that asks for it, and what is said then. */
+/** Of what a click can be for: the button that asks for it, what is said then, and what it does where it meets the model. */
 const WANTED = {
-  lay: ["lay", () => "Click a lit face: it can rest on that."], snap: ["snap", () => "Click the face whose plane it is to take."],
-  limb: ["limb", () => "Click the limb above the plane that is to come off alone; the others stay."],
+  lay: ["lay", () => "Click a lit face: it can rest on that."], snap: ["snap", () => "Click the face whose plane it is to take.", ({ face }, picture) => snapTo(face, picture)],
+  limb: ["limb", () => "Click the limb above the plane that is to come off alone; the others stay.", ({ place }) => cutLimb(place)],
   brush: ["mark-brush", () => `Paint ${markWord()}; Shift or the right button erases, [ and ] change the circle; Esc ends it.`],
-  faces: ["mark-faces", () => `Click where there is to be ${markWord()}; Esc ends it.`],
-  box: ["mark-box", () => (store.corner ? "Now the opposite corner." : "Click a corner of the box.")],
+  faces: ["mark-faces", () => `Click where there is to be ${markWord()}; Esc ends it.`, ({ place }) => markAt(place)],
+  box: ["mark-box", () => (store.corner ? "Now the opposite corner." : "Click a corner of the box."), ({ place }) => markAt(place)],
   measure: ["measure", () => "Click two points; corners attract. Esc ends it."],
 };
 
@@ -89,10 +88,6 @@ function press(event, picture) {
   const { clicks, tab } = store;
   if (!clicks || apartNow()) return void (tab === "parts" && choosePart(partMet(event, picture)));
   if (clicks === "lay") return layFacet(picture, event);
-  const spot = clicks === "brush" ? null : met(event, picture);
-  if (!spot) return;
-  if (clicks === "snap") snapTo(spot.face, picture);
-  else if (clicks === "limb") cutLimb(spot.place);
-  else markAt(spot.place);
+  const [, , act] = WANTED[clicks], spot = act && met(event, picture);
+  if (spot) act(spot, picture);
 }
-

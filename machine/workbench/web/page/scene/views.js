@@ -1,7 +1,11 @@
-// Axes: a small cross in the corner of the picture that tells where x, y and z are, and looks along the one that is clicked.
+// Views: a small cross in the corner of the picture that tells where x, y and z are, and looks along the one that is clicked; and the
+// section view, the inside of the model, seen where a plane cuts it away.
 
-import { $ } from "../../../../view/template/elements.js";
-import { cross, dot, RAD } from "../../../../view/template/picture/math.js";
+import { $, listen } from "../../../../view/template/elements.js";
+import { cross, dot } from "../../../../view/template/picture/math.js";
+import { sectionAsked } from "../../../../view/template/picture/shapes.js";
+import { planesNow } from "../parts/planes.js";
+import { store, subscribe } from "../store.js";
 
 const REACH_PX = 26;
 /** Of every end of an axis: its direction, and from where it is looked at, yaw and pitch in degrees. */
@@ -15,7 +19,7 @@ export function axesOf(camera, picture) {
   const ends = Object.fromEntries([...group.querySelectorAll("[data-end]")].map((end) => [end.dataset.end, end]));
   let seen = "";
   const look = (name) => {
-    [camera.yaw, camera.pitch] = ENDS[name][1].map((angle) => angle * RAD);
+    camera.lookFrom(...ENDS[name][1]);
     picture.ask();
   };
   for (const [name, end] of Object.entries(ends)) {
@@ -38,4 +42,22 @@ export function axesOf(camera, picture) {
     group.append(...order.map((name) => ends[name]));
   });
   group.removeAttribute("hidden");
+}
+
+export function sectionView(picture) {
+  const show = () => {
+    const cut = planesNow()[store.part - 2] || null;
+    $("section-cut").disabled = !cut;
+    picture.section(store.triangles ? sectionAsked(picture.box(), cut) : null);
+  };
+  listen("input", { "section-at": show });
+  const open = () => { // towards the eye
+    $("section-at").value = 0;
+    $("section-flip").checked = false;
+    show();
+    $("section-flip").checked = !picture.cutAway(picture.eye());
+    show();
+  };
+  listen("change", { "section-flip": show, "section-along": open });
+  subscribe(show);
 }
