@@ -1,11 +1,10 @@
 // Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
-import { $, alike, button, listen, made, numberIn, putAt, rowOf, swatch, tell } from "../../../../view/template/elements.js";
+import { $, alike, button, fill, listen, made, numberIn, putAt, putTable, removeButton, rowOf, swatch, tell } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
 import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { wordOf } from "../../../../view/template/picture/solids.js";
 import { newest, send } from "../line.js";
-import { fill, putTable, removeButton } from "../lists.js";
 import { modelSize } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";
 import { onState, store, subscribe, update } from "../store.js";

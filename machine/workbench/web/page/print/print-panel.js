@@ -1,9 +1,8 @@
 // Print panel: where to print, what is asked before, and the print while it runs. It has a line of its own to the prints, which go on
 // whatever becomes of this page.
 
-import { $, alike, disable, hide, listen, made, needsKey, notice, numberIn, onData, sayIn, tell } from "../../../../view/template/elements.js";
+import { $, alike, disable, hide, listen, made, needsKey, notice, numberIn, onData, putNew, sayIn, tell, withWholeOptions } from "../../../../view/template/elements.js";
 import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";
-import { putNew, withWholeOptions } from "../lists.js";
 import { onNew, onState, store, update } from "../store.js";
 import { followIn } from "./print-frame.js";
 import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showHistory, showPrint, showProgress, showWhich, silence, sure, tellTitle, webcamPanel } from "./print-shown.js";

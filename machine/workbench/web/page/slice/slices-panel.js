@@ -1,11 +1,10 @@
 // Slices panel: copies and pauses, the parts sliced and their walls in the picture, what the print takes, what the dry run complains of, what one piece
 // would cost, and all that is saved of a bench, in one menu.
 
-import { $, disable, findingButton, hide, listen, made, numberIn, onData, rowOf, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
+import { $, disable, fill, findingButton, hide, listen, listIn, made, numberIn, onData, putTable, removeButton, rowOf, sayIn, swatch, tell, tellIn, toggle } from "../../../../view/template/elements.js";
 import { cross, scaled, sub, unit } from "../../../../view/template/picture/math.js";
 import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/solids.js";
 import { save, send } from "../line.js";
-import { listIn, putTable, removeButton, tellIn } from "../lists.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 
 export function slicesPanel(showFinding) {
@@ -75,7 +74,7 @@ export function stopsPanel() {
   } });
   onState(({ copies, copies_told: told, problem }, before) => {
     tell({ "copies-told": told });
-    if (copies !== before?.copies || (problem && problem !== before?.problem) || document.activeElement !== $("copies")) $("copies").value = copies;
+    fill($("copies"), copies, copies !== before?.copies || (problem && problem !== before?.problem));
   });
   onNew(({ stops }) => stops, (stops) => {
     if (adding) $("stop-at").value = "";
@@ -144,23 +143,7 @@ export function wallsOf(picture) {
   });
 }
 
-const SECTIONS_OF = { machine: ["machine"], material: ["material"], process: ["process", "search"] }; // of the profiles' files
-
-/** Of each entry: why it cannot be saved, "": it can, and what it is. */
-function entriesOf({ lacking, sliced, compared, given }) {
-  const profiles = Object.entries(SECTIONS_OF).map(([kind, sections]) => {
-    const count = given.settings.filter((setting) => sections.includes(setting.split(".")[0].trim())).length, name = given[kind].split(/[\\/]/).at(-1);
-    return [kind, [count ? "" : `no setting of ${name} is changed`, `${name} with ${count} change${count === 1 ? "" : "s"}, to open here again`]];
-  });
-  return {
-    project: [lacking.model, "3MF with model, parts, marks and profiles, to open here or on another computer"],
-    plan: [lacking.parts, "orientation and cuts, to open here again"], parts: [lacking.parts, "zip of an STL file for each part, a coloured 3MF and the plan"],
-    pictures: [lacking.parts, "zip of PNGs: the parts, the print order, every number of parts"],
-    gcode: [lacking.slices, sliced?.errors.length ? "the dry run found errors: confirm before saving" : "for the printer"],
-    page: [lacking.slices, `one HTML file that opens anywhere${compared.length ? ", with the comparison" : ""}`], ...Object.fromEntries(profiles),
-  };
-}
-
+/** What is not there yet says why. */
 export function saveMenu() {
   const confirm = () => {
     const { errors } = store.state.sliced;
@@ -170,7 +153,7 @@ export function saveMenu() {
   };
   onData("save", ({ save: address }) => save(address));
   listen("click", { "save-gcode": () => (store.state.sliced.errors.length ? confirm() : save("print.gcode")), "save-errors": () => save("print.gcode?force=yes") });
-  onNew(entriesOf, (entries) => Object.entries(entries).forEach(([name, [why, words]]) => {
+  onNew(({ savable }) => savable, (savable) => Object.entries(savable).forEach(([name, [why, words]]) => {
     disable({ [`save-${name}`]: Boolean(why) });
     $(`save-${name}`).querySelector("small").textContent = why || words;
   }));
