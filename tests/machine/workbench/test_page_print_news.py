@@ -55,13 +55,12 @@ def test_temperatures_of_ten_minutes_are_lines_with_the_newest_at_the_right_edge
 
 
 @needs_node
-def test_a_warning_stands_beside_the_state_on_the_tab_and_in_the_bar_of_every_tab() -> None:
-    lost = "this print can no longer be resumed"
+def test_how_a_print_is_stands_on_the_tab_and_in_the_bar_of_every_tab() -> None:
     told = on_fake_page(
-        f"{PAGE} tell('printing', 0.5, {{ warning: '{lost}' }});"
+        f"{PAGE} tell('printing', 0.5, {{ how: 'printing, 50 %', texts: {{ 'run-news': 'box: printing' }} }});"
         " return ['run-state', 'bar-told', 'run-news'].map((id) => $(id).textContent);"
     )
-    assert told == [f"printing, 50 % · {lost}", f"box at sim: printing, 50 % · {lost}", f"box: printing: {lost}"]
+    assert told == ["printing, 50 %", "box at sim: printing, 50 %", "box: printing"]
 
 
 @needs_node
@@ -70,7 +69,7 @@ def test_earlier_prints_are_listed_with_outcome_time_and_filament_where_there_ar
     killed = "{ name: 'tee', outcome: 'failed', begun: 0, seconds: null, filament_m: null }"
     cells = on_fake_page(f"return [{done}, {killed}].map((past) => modules['print/print-shown'].pastCells(past).slice(0, 4));")
     assert cells == [["box", "done", "1h 30m", "1.3 m"], ["tee", "failed", "–", "–"]]
-    shown = "$('history-field').hidden, $('history').children.length"
+    shown = "$('history-field').hidden, $('past-prints').children.length"
     told = "fake.sockets[0].tell({ ports: null, asking: false, journals: null, prints: [], history: "
     assert on_fake_page(f"{PAGE} {told}[] }}); return [{shown}];") == [True, 0]
     assert on_fake_page(f"{PAGE} {told}[{done}] }}); return [{shown}];") == [False, 2]

@@ -32,32 +32,16 @@ export function showWhich(prints, chosen) {
   $("which").value = chosen;
 }
 
-const BEFORE = { checking: "checking …", printing: "starting", cancelling: "ending" }; // any moment is known
-
-/** What stands above a print: how it is, or how it has ended. */
-function stateOf(print) {
-  const { state, starts } = print;
-  if (print.is_over) return print.sentence;
-  if (print.live) return stateTold(print);
-  if (state === "uploading") return print.message || "handing the file over";
-  return state === "ready" ? (starts ? "ready to print" : "ready to be handed over") : BEFORE[state] || "";
-}
+const howTold = (print) => [silence(print), print.how].filter(Boolean).join(" · ");
 
 export function showPrint(print, commands) {
   hide({ run: !print });
   if (!print) return void ($("printer-field").open = true);
-  const { state, is_over: over, is_away: paused, live, figures, server, starts, resumes } = print, uploads = state === "uploading";
+  const { state, is_over: over, is_away: paused, live, figures, server } = print, uploads = state === "uploading";
   const runs = print.is_printing || state === IN_HAND, asking = !runs && !uploads && (!over || state === "refused");
   const commanded = print.is_printing && state !== "cancelling" && commands;
-  tell({
-    "run-title": `${resumes ? "the rest of " : ""}${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`, "run-state": stateOf(print),
-    "run-news": `${print.name}: ${over ? print.sentence : [state, print.warning].filter(Boolean).join(": ")}`, // a reader need not hear every per cent
-    "ask-told": print.question || (starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
-      : "The server keeps the file; nothing prints before somebody starts it there."),
-    "begin": resumes ? "Yes, go on" : starts ? "Print now" : "Hand it over", "leave": resumes ? "No, leave it" : "Not now", "pause": paused ? "Resume" : "Pause",
-    "sure-told": `Cancel this print? ${server ? "The server ends it, as its own macros say." : "The heaters go off, and what is printed stays as it is."}`,
-    "held-told": print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.",
-  });
+  const held = print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.";
+  tell({ ...print.texts, "run-state": howTold(print), "held-told": held });
   hide({
     "run-ask": state !== "ready" || !commands, "run-live": !live && !uploads, "run-upload": !uploads || !commands, "leave-printing": !server,
     "run-commands": !commanded, "held": over || commands, "words-line": !print.words.length, "run-log": !print.log, "forget": !over || !commands,
@@ -66,7 +50,7 @@ export function showPrint(print, commands) {
   $("run-state").className = over ? state : "";
   $("pause").dataset.print = paused ? "resume" : "pause";
   $("run-log").href = `prints/${print.number}/log`;
-  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on anyway` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
+  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on anyway` : text)), ...(figures && !over ? [figures.text] : [])] : []);
   listIn("run-findings", asking && figures ? figures.findings : []);
   listIn("run-words", print.words.slice(-FEW));
   listIn("run-said", runs || uploads || over ? print.said.filter((line) => line && (!print.log || !line.includes(print.log))).slice(-FEW) : []);
@@ -77,14 +61,6 @@ export function showPrint(print, commands) {
   shownState = kind;
   if (over && print.forcible && commands) hide({ "force-line": false });
 }
-
-function stateTold(print) {
-  const { state, share, left_s: left, message, warning } = print;
-  return [silence(print), share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message, warning].filter(Boolean).join(" · ");
-}
-
-const figuresTold = ({ lines, time_s: time, filament_mm: filament, filament_g: grams, costs, errors }) =>
-  `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m (${grams.toFixed(1)} g${costs ? `, ${costs}` : ""}) of filament${errors ? `, ${errors} error${errors === 1 ? "" : "s"} in the dry run` : ""}`;
 
 /** How long ago a moment was, in seconds since 1970. */
 function ago(moment_s) {
@@ -132,7 +108,7 @@ export function showBar(running, looked) {
   const shown = running.includes(looked) ? looked : running.at(-1);
   hide({ "bar-told": !shown, "emergency": !shown, "print-bar": !shown && $("stop-told").hidden });
   if (!shown) return;
-  tell({ "bar-told": `${shown.name} at ${shown.port}: ${stateTold(shown)}` });
+  tell({ "bar-told": `${shown.name} at ${shown.port}: ${howTold(shown)}` });
   $("emergency").dataset.print = shown.number;
 }
 
