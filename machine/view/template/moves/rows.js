@@ -12,15 +12,11 @@ export const openBlock = (text) => blockOf(Uint8Array.fromBase64 ? Uint8Array.fr
 
 /** {header, array}; array(name) decodes a column list: one typed array a column, in whole multiples of the scale. */
 export async function blockOf(pressed) {
-  const bytes = await inflated(pressed), decoder = new TextDecoder(), magic = decoder.decode(bytes.subarray(0, 8));
+  const stream = new Blob([pressed]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const bytes = new Uint8Array(await new Response(stream).arrayBuffer()), decoder = new TextDecoder(), magic = decoder.decode(bytes.subarray(0, 8));
   if (magic !== MAGIC) throw new Error(`the page's data begin with ${magic}, not ${MAGIC}`);
   const end = 12 + new DataView(bytes.buffer).getUint32(8, true), header = JSON.parse(decoder.decode(bytes.subarray(12, end)));
   return { header, array: (name) => columnsOf(bytes.buffer, end, header.arrays[name]) };
-}
-
-async function inflated(bytes) {
-  const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
 function columnsOf(buffer, start, told) {

@@ -3,7 +3,7 @@
 import { $, button, findingButton, hide, listen, made, putAt, roughly, rowOf, termsOf } from "../elements.js";
 import { standing } from "../moves/picture.js";
 import { carried, projected } from "../picture/math.js";
-import { MOST_CUTS } from "../picture/solids.js";
+import { MOST_CUTS } from "../picture/shapes.js";
 
 const orDash = (value, told) => (value === null ? "–" : told(value));
 const FRONT = [

@@ -2,8 +2,7 @@
 
 import { $, alike, button, fill, listen, made, numberIn, putAt, putTable, removeButton, rowOf, swatch, tell } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
-import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/picture/shapes.js";
-import { wordOf } from "../../../../view/template/picture/solids.js";
+import { boxCorners, boxEdges, trianglesOf, wordOf } from "../../../../view/template/picture/shapes.js";
 import { newest, send } from "../line.js";
 import { modelSize } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";

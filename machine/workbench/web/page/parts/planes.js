@@ -2,8 +2,7 @@
 
 import { $, alike, disable, fill, hide, listen, mm2, numberIn, onData, pressed, putAt, tell } from "../../../../view/template/elements.js";
 import { add, clamp, cross, dot, length, RAD, rotated, scaled, sub, turned, unit } from "../../../../view/template/picture/math.js";
-import { beside, boxesOf, chained, circle, headOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
-import { RED } from "../../../../view/template/picture/solids.js";
+import { beside, boxesOf, chained, circle, headOf, RED, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { ask, send } from "../line.js";
 import { modelSize } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";

@@ -3,7 +3,7 @@
 
 import { $, disable, fill, findingButton, hide, listen, listIn, made, numberIn, onData, putTable, removeButton, rowOf, sayIn, swatch, tell, tellIn, toggle } from "../../../../view/template/elements.js";
 import { cross, scaled, sub, unit } from "../../../../view/template/picture/math.js";
-import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/solids.js";
+import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/shapes.js";
 import { save, send } from "../line.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 
