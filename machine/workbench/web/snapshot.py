@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from machine.dryrun.findings import Finding
+from machine.planning.stops import Stop
 from machine.program import Alternative
 from machine.quantities import about, duration, filament_g, newtons, percent, price_in_words
 from machine.view.parts import front_record, page_colours
@@ -203,7 +204,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "given": asdict(bench.given),
         "part_settings": [{"part": own.part, "keys": list(own.process)} for own in bench.profile.parts],
         "priced": bench.priced,
-        "stops": [asdict(stop) for stop in bench.stops],
+        "stops": [_stop(stop) for stop in bench.stops],
         "copies": bench.copies,
         "copies_mm": standing and [[round(x, 3), round(y, 3)] for x, y in standing.copies_mm],
         "copies_told": _copies_told(session),
@@ -252,6 +253,12 @@ def _resting(session: Session) -> list[dict[str, Any]]:
 def _words(steps: Sequence[Step]) -> list[str]:
     """What the last steps of a history did, the nearest first."""
     return [terminal_words(step.word) for step in steps[::-1][:MOST_STEPS_LISTED]]
+
+
+def _stop(stop: Stop) -> dict[str, str]:
+    """A pause in words."""
+    where = f"at {stop.height_mm or 0.0:.12g} mm" if stop.layer is None else f"before layer {stop.layer}"
+    return {"kind": "filament change" if stop.change else "pause", "where": f"part {stop.part}, {where}"}
 
 
 def _copies_told(session: Session) -> str:

@@ -64,6 +64,17 @@ def test_how_a_print_is_stands_on_the_tab_and_in_the_bar_of_every_tab() -> None:
 
 
 @needs_node
+def test_a_camera_is_looked_at_every_two_seconds_until_its_print_is_over() -> None:
+    act = f"""{PAGE} tell('printing', 0.5, {{ webcam: true }});
+        Object.assign($('webcam'), {{ complete: true }}); fake.wait(2000);
+        const asked = $('webcam').src.split('?')[0]; $('webcam').onload();
+        const seen = [asked, $('webcam-line').hidden];
+        tell('done', 1, {{ webcam: true, is_over: true }}); fake.wait(2000);
+        return [...seen, $('webcam-line').hidden];"""
+    assert on_fake_page(act) == ["prints/1/webcam", False, True]
+
+
+@needs_node
 def test_earlier_prints_are_listed_with_outcome_time_and_filament_where_there_are_any() -> None:
     done = "{ name: 'box', outcome: 'done', begun: 0, seconds: 5400, filament_m: 1.25 }"
     killed = "{ name: 'tee', outcome: 'failed', begun: 0, seconds: null, filament_m: null }"

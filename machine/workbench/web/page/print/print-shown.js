@@ -154,21 +154,15 @@ const EVERY_MS = 2000;
 /** A picture of the camera at a print server, anew every two seconds while it is looked at: of print(). It comes through the workbench, for
  * the page loads nothing from elsewhere. */
 export function webcamPanel(print) {
-  let shown = "", asking = false;
-  const show = (address) => {
-    hide({ "webcam-line": !address });
-    if (address) $("webcam").src = address;
-    if (shown) URL.revokeObjectURL(shown);
-    shown = address;
-  };
-  setInterval(async () => {
-    const job = print();
-    if (!job?.webcam || job.is_over) return show("");
-    if (asking || document.hidden || $("printing").hidden) return;
-    asking = true;
-    const answer = await fetch(`prints/${job.number}/webcam`).catch(() => null), picture = answer?.ok ? await answer.blob().catch(() => null) : null;
-    asking = false;
-    show(picture && print()?.number === job.number ? URL.createObjectURL(picture) : "");
+  const picture = $("webcam"), show = (whether) => hide({ "webcam-line": !whether });
+  const filmed = () => (print()?.webcam && !print().is_over ? print().number : 0);
+  let asked = 0; // the print whose picture is there, or on its way
+  Object.assign(picture, { onload: () => show(filmed() === asked), onerror: () => show(false) });
+  setInterval(() => {
+    if (!filmed()) return show(false);
+    if (document.hidden || $("printing").hidden || !picture.complete) return;
+    asked = filmed();
+    picture.src = `prints/${asked}/webcam?${Date.now()}`;
   }, EVERY_MS);
 }
 

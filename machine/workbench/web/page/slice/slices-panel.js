@@ -80,14 +80,10 @@ export function stopsPanel() {
     if (adding) $("stop-at").value = "";
     adding = false;
     const held = $("stops").contains(document.activeElement);
-    putTable($("stops"), stops, [], () => stops.map((stop, k) => stopRow(stop, () => send({ do: "remove_stop", number: k + 1 }))));
+    putTable($("stops"), stops, [], () => stops.map(({ kind, where }, k) => (
+      rowOf([kind, where, removeButton(`Remove the ${kind} of ${where}`, () => send({ do: "remove_stop", number: k + 1 }))]))));
     if (held) $("stop-at").focus(); // the row that had the focus is gone
   });
-}
-
-function stopRow({ part, layer, height_mm: height, change }, remove) {
-  const kind = change ? "filament change" : "pause", where = layer === null ? `part ${part}, at ${height} mm` : `part ${part}, before layer ${layer}`;
-  return rowOf([kind, where, removeButton(`Remove the ${kind} of ${where}`, remove)]);
 }
 
 export function comparePanel() {
