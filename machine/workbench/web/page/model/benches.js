@@ -1,8 +1,7 @@
 // Benches: several models at once, each on a bench and in a page of its own; what was left from earlier; and the devices that were let in.
 
-import { $, button, hide, listen, made, notice, partsInWords, tell } from "../../../../view/template/elements.js";
+import { $, button, clock, hide, listen, made, moment, notice, partsInWords, putRows, removeButton, tell } from "../../../../view/template/elements.js";
 import { lineAt, OWN_PAGE } from "../line.js";
-import { clock, moment, putRows, removeButton } from "../lists.js";
 import { onNew } from "../store.js";
 
 const TOLD_MS = 8000;

@@ -1,8 +1,7 @@
 // Parts panel: the search, its front as a slider, and every part as a card, chosen there as in the picture, with keys and a menu for what is done to it.
 
-import { $, alike, button, disable, hide, listen, made, needsKey, partsInWords, roughly, swatch, tell, termsOf, toggle } from "../../../../view/template/elements.js";
+import { $, alike, button, disable, hide, listen, listIn, made, mm2, needsKey, newtons, partsInWords, putNew, roughly, swatch, tell, tellIn, termsOf, toggle } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
-import { listIn, mm2, newtons, putNew, tellIn } from "../lists.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 import { anglesOf, choosePart, figuresNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
 

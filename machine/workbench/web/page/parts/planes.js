@@ -1,11 +1,9 @@
 // Planes: those that are looked at, as the bench has them or a hand holds one: their panel, the knobs in the picture, and what a refused one is in the way of.
 
-import { $, alike, disable, hide, listen, numberIn, onData, pressed, putAt, tell } from "../../../../view/template/elements.js";
+import { $, alike, disable, fill, hide, listen, mm2, numberIn, onData, pressed, putAt, tell } from "../../../../view/template/elements.js";
 import { add, clamp, cornersOf, cross, dot, length, RAD, rotated, scaled, sub, turned, unit } from "../../../../view/template/picture/math.js";
-import { beside, boxesOf, chained, circle, headOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
-import { RED } from "../../../../view/template/picture/solids.js";
+import { beside, boxesOf, chained, circle, headOf, RED, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { ask, send } from "../line.js";
-import { fill, mm2 } from "../lists.js";
 import { modelSize } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";
 import { cornersAt } from "../scene/face-tree.js";
@@ -170,13 +168,12 @@ export function handlesOf(picture) {
   const stepOf = ({ tilts }) => (tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * far());
   KNOBS.forEach((knob) => gripOf($(knob.id), {
     take: (event) => {
-      const along = alongWay(picture, placeOf(knob), planeNow().normal, event);
-      return along && { ...taken(knob), along };
+      const along = alongWay(picture, placeOf(knob), planeNow().normal, event), held = taken(knob);
+      return along && ((later) => moved(held, along(later)));
     },
-    move: (held, event) => holdPlane(moved(held, held.along(event))),
+    hold: holdPlane, drop: leavePlane,
     put: () => { if (store.hand) putPlane(store.hand.plane); },
-    drop: leavePlane,
-    step: (sign) => holdPlane(moved(taken(knob), sign * stepOf(knob))),
+    step: (sign) => moved(taken(knob), sign * stepOf(knob)),
   }));
   const place = () => {
     $("handles").hidden = !section || !planeNow() || isLocked() || Boolean(store.clicks);
