@@ -236,8 +236,8 @@ class Feed:
         self.set_state(PrintState.FINISHING)
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send("M155 S0")
-        for command in self.pending.undo_overrides():
-            exchange.send(command)
+        for own in (*self.pending.next_lines(self.modal), *self.pending.undo_overrides()):  # no override is undone that was not sent
+            exchange.send(own)
         self._end_moves()
         self.finished = True
         self._record()

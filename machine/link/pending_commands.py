@@ -20,6 +20,7 @@ from profiles.errors import LocalProtocolError
 MOST_AT_ONCE = 16  # requests taken per turn: a flood of requests must not hold up the print
 # Marlin allows 10 to 999 per cent; beyond 300 the planner starves, beyond 200 the extruder slips.
 FEED_PERCENT, FLOW_PERCENT = (10.0, 300.0), (10.0, 200.0)
+KEEPS_OFFSET = " MOVE=1"  # ends the command of a firmware (Klipper) whose Z offset outlasts homing, and so the print
 MOST_OFFSET_MM = 2.0  # the whole Z offset of a print: an error beyond this is one of homing
 
 
@@ -150,8 +151,7 @@ class PendingCommands:
         """Commands that reset the overrides, which the firmware would keep for the next print."""
         pairs = (("M220", self.feed_percent), ("M221", self.flow_percent))
         undone = [f"{name} S100" for name, value in pairs if value != 100.0]
-        shifted = self.babystep.format(f"{-self.z_offset_mm:.3f}").removesuffix(" MOVE=1")  # Klipper's motors may be off by now
-        return [*undone, shifted] if self.z_offset_mm else undone
+        return [*undone, offset_undone(self.z_offset_mm, self.babystep)] if self.z_offset_mm else undone
 
     def _queue_line(self, text: str, state: PrintState) -> None:
         why = line_refusal(text, self.axes, state is PrintState.PAUSED, self.limit)
@@ -160,6 +160,7 @@ class PendingCommands:
             self.lines.append(command_of(text, "the command", self.limit))
 
     def _shift(self, by_mm: float) -> None:
+        by_mm = round(by_mm, 3)  # as it is sent
         wanted_mm = round(self.z_offset_mm + by_mm, 3)
         self.message = offset_refusal(wanted_mm, self.babystep) or ""
         if not self.message:
@@ -190,6 +191,11 @@ def offset_refusal(wanted_mm: float, babystep: str) -> str | None:
         return "no Z offset: this firmware cannot shift Z during a print (Marlin needs BABYSTEPPING)"
     allowed = f"{-MOST_OFFSET_MM:g} to {MOST_OFFSET_MM:g} mm are allowed"
     return None if abs(wanted_mm) <= MOST_OFFSET_MM else f"a Z offset of {wanted_mm:.3g} mm is not possible: {allowed}"
+
+
+def offset_undone(offset_mm: float, babystep: str) -> str:
+    """The command that takes a Z offset back; Klipper's does not move, because the motors may be off by now."""
+    return babystep.format(f"{-offset_mm:.3f}").removesuffix(KEEPS_OFFSET)
 
 
 def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:

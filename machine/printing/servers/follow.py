@@ -15,10 +15,12 @@ from functools import partial
 from machine.link.pending_commands import (
     FEED_PERCENT,
     FLOW_PERCENT,
+    KEEPS_OFFSET,
     Command,
     Control,
     PendingCommand,
     offset_refusal,
+    offset_undone,
     percent_refusal,
 )
 from machine.link.print_state import PrintState, PrintStatus, last_known
@@ -68,7 +70,8 @@ class Follower:
         self._shown: tuple[PrintStatus | None, str] = (None, "")
         self._shown_s = 0.0
         self._percents: dict[Command, float] = {}  # ordered values: not every server reports them
-        self._offset_mm = 0.0  # requested in total
+        # Z offsets in total: ordered, even if the order still waits for a slow server; refused by the server; executed.
+        self._asked_mm = self._refused_mm = self._offset_mm = 0.0
 
     def run(self) -> PrintState:
         """Follow the print to DONE, CANCELLED, LEFT, or FAILED after an emergency stop.
@@ -84,7 +87,16 @@ class Follower:
             if self._take_requests():
                 return PrintState.FAILED
             raise
-        return PrintState.FAILED if end is not PrintState.FAILED and self._take_requests() else end
+        if end is not PrintState.FAILED and self._take_requests():
+            return PrintState.FAILED
+        self._undo_offset(end)
+        return end
+
+    def _undo_offset(self, end: PrintState) -> None:
+        """Take back a Z offset that the firmware would keep for the next print; a print that is left still needs it."""
+        if self._offset_mm and end in (PrintState.DONE, PrintState.CANCELLED) and self.babystep.endswith(KEEPS_OFFSET):
+            with suppress(ServerError):
+                self.server.command(offset_undone(self._offset_mm, self.babystep))
 
     def _followed(self) -> PrintState:
         works = (self._poll, self._carry_out)
@@ -204,9 +216,13 @@ class Follower:
             self._message = percent_refusal(value, FEED_PERCENT if command is Command.FEED else FLOW_PERCENT) or ""
             return None if self._message else partial(self._set_percent, command, value)
         if command is Command.BABYSTEP:
-            wanted_mm = round(self._offset_mm + value, 3)
+            by_mm = round(value, 3)
+            wanted_mm = round(self._asked_mm - self._refused_mm + by_mm, 3)
             self._message = offset_refusal(wanted_mm, self.babystep) or ""
-            return None if self._message else partial(self._shift, value)
+            if self._message:
+                return None
+            self._asked_mm += by_mm
+            return partial(self._shift, by_mm)
         if command is Command.CANCEL:
             return self._cancel
         return partial(self.server.order, command) if command in (Command.PAUSE, Command.RESUME) else None
@@ -227,7 +243,15 @@ class Follower:
         self._percents[command] = value
 
     def _shift(self, by_mm: float) -> None:
-        self.server.command(self.babystep.format(f"{by_mm:.3f}"))
+        """Shift Z. A refused order does not count, one without an answer may have been executed."""
+        try:
+            self.server.command(self.babystep.format(f"{by_mm:.3f}"))
+        except NoAnswerError:
+            self._offset_mm = round(self._offset_mm + by_mm, 3)
+            raise
+        except ServerError:
+            self._refused_mm += by_mm
+            raise
         self._offset_mm = round(self._offset_mm + by_mm, 3)
 
     def _with_percents(self, status: PrintStatus) -> PrintStatus:

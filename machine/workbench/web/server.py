@@ -161,10 +161,10 @@ def _demo_picture(name: str) -> str:
 
 
 def policy(style: str, script: str, lines: Iterable[str]) -> str:
-    """Content security policy: own script and style, images that the page creates, and connections to its server."""
+    """Content security policy: own script and style, images that the page creates, and images and connections of its server."""
     server = " ".join(("'self'", *lines))
     own = f"script-src {hash_source(script)}; style-src {hash_source(style)}; connect-src {server}"
-    rest = "frame-src 'self'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    rest = "frame-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     return f"default-src 'none'; {own}; {rest}"
 
 

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 
 from machine.firmware import dialect_of
-from machine.link.pending_commands import Command
+from machine.gcode.modes import axes_of
+from machine.link.pending_commands import Command, PendingCommand, PendingCommands
+from machine.link.print_state import PrintState
 from profiles.profile import Profile, load
 from tests.machine.link.test_pause import PROGRAM, Watcher, strokes, watched
 
@@ -61,3 +63,17 @@ def test_a_firmware_without_babystepping_refuses_it(machine: str) -> None:
     watcher = watched({100: (Command.BABYSTEP, 0.05)}, profile=profile)
     watcher.run(PROGRAM)
     assert any(status.message.startswith("no Z offset: this firmware cannot") for status in watcher.shown)
+
+
+def test_steps_below_a_micrometre_do_not_pass_the_limit_unseen() -> None:
+    pending = PendingCommands(axes_of(None), babystep="M290 Z{}")
+    for _ in range(5000):
+        pending.accept(PendingCommand(Command.BABYSTEP, 0.0005), PrintState.PRINTING, 0.0)
+    sent_mm = sum(float(line.removeprefix("M290 Z")) for line in pending.lines)
+    assert round(sent_mm, 3) == pending.z_offset_mm <= 2.0
+
+
+def test_a_z_offset_asked_for_after_the_last_command_is_not_taken_back_unsent() -> None:
+    watcher = watched({len(PROGRAM) - 4: (Command.BABYSTEP, -0.05)})  # as the last commands fill the window
+    watcher.run(PROGRAM)
+    assert [line for line in watcher.lines() if line.startswith("M290")] == ["M290 Z-0.050", "M290 Z0.050"]

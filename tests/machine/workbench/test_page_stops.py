@@ -55,6 +55,12 @@ def test_the_key_e_pressed_twice_within_a_second_stops_and_shows_that_it_is_held
     assert on_fake_page(f"{TWO_PRINTS} return {held}.filter((value) => value !== undefined);") == [True, False]
 
 
+@needs_node
+def test_the_key_e_stays_held_while_another_key_is_released() -> None:
+    held = "fake.press('e'); fake.wait(200); fake.press('Shift', {}, 'keyup'); fake.wait(400);"
+    assert on_fake_page(f"{TWO_PRINTS} {held} return fake.sent();") == [{"do": "emergency", "print": 2}]
+
+
 LINE_LOST = f"""{TWO_PRINTS}
     fake.sockets[0].lose();
     $('emergency').fire('click');

@@ -225,6 +225,40 @@ def test_a_z_offset_is_the_firmwares_own_command_and_bounded(kind: str, sent: st
     assert -0.01 in {offset for offset, _ in told}
 
 
+def test_z_offsets_that_wait_for_a_slow_server_are_bounded_together() -> None:
+    control = Control()
+    for _ in range(3):  # the server has carried out none of them before the last is taken
+        control.ask(Command.BABYSTEP, -0.9)
+    with printing("moonraker") as (job, server):
+
+        def stop(status: PrintStatus, message: str) -> None:
+            if status.z_offset_mm < -1.0:
+                control.ask(Command.EMERGENCY_STOP)
+
+        left, babystep = (lambda: False), server.babystep
+        Follower(server, UPLOAD.name, 1, on_status=stop, control=control, left=left, babystep=babystep).run()
+    assert job.commands[:3] == ["SET_GCODE_OFFSET Z_ADJUST=-0.900 MOVE=1"] * 2
+
+
+@pytest.mark.parametrize("end", [PrintState.DONE, PrintState.CANCELLED])
+def test_a_z_offset_that_klipper_would_keep_for_the_next_print_is_taken_back(end: PrintState) -> None:
+    control, left = Control(), lambda: False
+    with printing("moonraker") as (job, server):
+
+        def watch(status: PrintStatus, message: str) -> None:
+            if status.z_offset_mm and end is PrintState.CANCELLED:
+                control.ask(Command.CANCEL)
+            elif status.z_offset_mm:
+                job.steps = 1
+            elif status.state is PrintState.PRINTING and not job.commands:
+                control.ask(Command.BABYSTEP, -0.05)
+                job.commands.append("M400")  # asked for once
+
+        follower = Follower(server, UPLOAD.name, 1, on_status=watch, control=control, left=left, babystep=server.babystep)
+        assert follower.run() is end
+    assert job.commands == ["M400", "SET_GCODE_OFFSET Z_ADJUST=-0.050 MOVE=1", "SET_GCODE_OFFSET Z_ADJUST=0.050"]
+
+
 @every_kind
 def test_a_z_offset_is_refused_where_the_firmware_is_not_known(kind: str) -> None:
     control, told = Control(), set[str]()

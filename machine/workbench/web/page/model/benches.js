@@ -1,8 +1,7 @@
 // Benches: several models at once, each on a bench and in a page of its own; what was left from earlier; and the devices that were let in.
 
-import { $, button, hide, listen, made, notice, partsInWords, tell } from "../../../../view/template/elements.js";
+import { $, button, clock, hide, listen, made, moment, notice, partsInWords, putRows, removeButton, tell } from "../../../../view/template/elements.js";
 import { lineAt, OWN_PAGE } from "../line.js";
-import { clock, putRows, removeButton } from "../lists.js";
 import { onNew } from "../store.js";
 
 const TOLD_MS = 8000;
@@ -65,11 +64,6 @@ const OFFERS = { // most: entries that are listed, until all of them are asked f
   kept: { list: "kept-works", most: 5, wordsOf: ({ parts, written_s: written }) => [parts ? partsInWords(parts) : "uncut", moment(written)] },
   left: { list: "left-files", most: 5, wordsOf: ({ bytes, written_s: written }) => [`${Math.ceil(bytes / 1000).toLocaleString("en")} kB`, moment(written)] },
 };
-
-function moment(seconds) {
-  const at = new Date(1000 * seconds);
-  return at.toDateString() === new Date().toDateString() ? clock(seconds) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
-}
 
 /** What is there from earlier, the newest first: work that was kept, or files that a workbench has left which was killed; at first the newest of each name. */
 export async function offer(what) {

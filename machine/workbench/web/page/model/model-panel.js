@@ -1,9 +1,8 @@
 // Model panel: the file, how it is turned, what overhangs then, how large it is, and where on the plate it and its copies stand.
 
-import { $, alike, button, hide, listen, numberIn, onData, putAt, sayIn, tell } from "../../../../view/template/elements.js";
+import { $, alike, button, fill, hide, listen, listIn, mm2, numberIn, onData, putAt, putNew, sayIn, tell, tellIn } from "../../../../view/template/elements.js";
 import { add, sub } from "../../../../view/template/picture/math.js";
 import { ask, send } from "../line.js";
-import { fill, listIn, mm2, putNew, tellIn } from "../lists.js";
 import { gripOf } from "../scene/grip.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
@@ -83,11 +82,10 @@ export function sizePanel() {
   }));
   onState(({ standing, scale: factor, machine, problem, place_mm: place }, before) => {
     if (!standing) return;
-    const fresh = problem !== before?.problem || !alike(standing, shown);
+    const anew = problem !== before?.problem || !alike(standing, shown);
     shown = standing;
-    const put = (input, value) => { if (fresh) input.value = value; else fill(input, value); };
-    put($("scale"), Number((100 * factor).toPrecision(6)));
-    sides.forEach((side, k) => put(side, standing.size_mm[k].toFixed(2)));
+    fill($("scale"), Number((100 * factor).toPrecision(6)), anew);
+    sides.forEach((side, k) => fill(side, standing.size_mm[k].toFixed(2), anew));
     tell({ "fit-told": standing.problem ? `${place.some(Boolean) ? "Not at this place" : "Too large in one piece"}: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.` });
     $("fit-told").classList.toggle("refused", Boolean(standing.problem));
   });
@@ -133,7 +131,7 @@ export function placePanel(picture) {
 
 /** The knob at the model's foot. */
 function handleOf(picture) {
-  const knob = $("hand-place");
+  const knob = $("hand-place"), hold = (placing) => update({ placing }), stepOf = ({ shiftKey }) => (shiftKey ? LARGE_STEP_MM : STEP_MM);
   /** Where a hand is on the plate, from the middle of the model as it stands now; null: it looks above the plate's horizon. */
   const onPlate = (event) => {
     const [eye, along] = picture.sight(event);
@@ -141,16 +139,16 @@ function handleOf(picture) {
   };
   gripOf(knob, {
     take: (event) => {
-      const from = onPlate(event);
-      return from && { from, stood: placeNow() };
+      const from = onPlate(event), stood = placeNow();
+      let to = from;
+      return from && ((later) => {
+        to = onPlate(later) || to;
+        return rounded(stood.map((x, axis) => x + to[axis] - from[axis]), stepOf(later));
+      });
     },
-    move: ({ from, stood }, event) => {
-      const to = onPlate(event);
-      if (to) update({ placing: rounded(stood.map((x, axis) => x + to[axis] - from[axis]), event.shiftKey ? LARGE_STEP_MM : STEP_MM) });
-    },
+    hold, drop: () => hold(null),
     put: () => { if (store.placing) put(store.placing); },
-    drop: () => update({ placing: null }),
-    step: (sign, { key, shiftKey }) => update({ placing: WAYS[key].map((way, axis) => placeNow()[axis] + way * (shiftKey ? LARGE_STEP_MM : STEP_MM)) }),
+    step: (sign, event) => WAYS[event.key].map((way, axis) => placeNow()[axis] + way * stepOf(event)),
   });
   picture.drawn.push(() => {
     const shown = store.tab === "model" && store.state?.model && store.triangles && store.clicks !== "lay";

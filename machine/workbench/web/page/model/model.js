@@ -1,10 +1,9 @@
 // Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal; and the ways in which it can lie.
 
-import { $, alike, button, hide, made, notice, swatches, tell } from "../../../../view/template/elements.js";
+import { $, alike, button, hide, made, mm2, notice, swatches, tell } from "../../../../view/template/elements.js";
 import { add, scaled, sub } from "../../../../view/template/picture/math.js";
 import { trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { AGAIN_MS, newest, send } from "../line.js";
-import { mm2 } from "../lists.js";
 import { fadedColours } from "../parts/pieces.js";
 import { planesNow } from "../parts/planes.js";
 import { cornersAt, faceMet } from "../scene/face-tree.js";

@@ -25,10 +25,10 @@ export function ringsOf(picture) {
     const group = groups.find(({ dataset }) => dataset.ring === axis);
     Object.assign(group, { ariaValueNow: deg, ariaValueText: `${deg} degrees` });
   };
-  const preview = (axis, ring, deg) => {
-    turning = { axis, ring, deg };
-    told(axis, deg);
-    update({ turning: turnedFurther(store.state.rotation, scaled(RING_AXES[axis], deg)) });
+  const hold = (now) => {
+    turning = now;
+    told(now.axis, now.deg);
+    update({ turning: turnedFurther(store.state.rotation, scaled(RING_AXES[now.axis], now.deg)) });
   };
   const done = (taken) => {
     const last = turning;
@@ -42,16 +42,14 @@ export function ringsOf(picture) {
   groups.forEach((group) => {
     const axis = group.dataset.ring;
     gripOf(group, {
-      take: (event) => ({ ring: ringNow(), ...graspOf(picture, RING_AXES[axis], ringNow(), event) }),
-      move: (held, event) => {
-        const step = stepOf(event);
-        preview(axis, { ...held.ring, from: held.from }, Math.round(held.turnedTo(event) / step) * step);
+      take: (event) => {
+        const ring = ringNow(), { from, turnedTo } = graspOf(picture, RING_AXES[axis], ring, event);
+        return (later) => ({ axis, ring: { ...ring, from }, deg: Math.round(turnedTo(later) / stepOf(later)) * stepOf(later) });
       },
-      put: () => done(true),
-      drop: () => done(false),
+      hold, put: () => done(true), drop: () => done(false),
       step: (sign, event) => {
-        const { ring, deg } = turning || { ring: { ...ringNow(), from: 0 }, deg: 0 };
-        preview(axis, ring, deg + sign * stepOf(event));
+        const now = turning || { axis, ring: { ...ringNow(), from: 0 }, deg: 0 };
+        return { ...now, deg: now.deg + sign * stepOf(event) };
       },
     });
   });
@@ -67,8 +65,7 @@ export function ringsOf(picture) {
       const parts = { far: () => true, near: ({ near }) => near, reach: () => true };
       for (const [name, wanted] of Object.entries(parts)) group.querySelector(`.${name}`).setAttribute("d", pathOf(seen, wanted));
       const label = seen.reduce((best, spot) => (spot.at && spot.near && (!best || spot.at[1] < best[1]) ? spot.at : best), null) || [-99, -99];
-      group.querySelector("text").setAttribute("x", label[0]);
-      group.querySelector("text").setAttribute("y", label[1]);
+      group.querySelector("text").setAttribute("transform", `translate(${label})`);
     });
     showSweep(picture, turning);
   });
@@ -124,6 +121,5 @@ function showSweep(picture, turning) {
   const middle = picture.placeOf(ring.centre), end = places[steps];
   if (!middle || places.some((place) => !place)) return;
   $("ring-sweep").setAttribute("d", `M${[middle, ...places].map((place) => place.map((x) => x.toFixed(1)).join(" ")).join("L")}Z`);
-  $("ring-told").setAttribute("x", end[0]);
-  $("ring-told").setAttribute("y", end[1] - 10);
+  $("ring-told").setAttribute("transform", `translate(${end})`);
 }

@@ -1,10 +1,9 @@
 // Pieces: the parts as bodies of their own, drawn apart along their printing directions, so that the faces of the cuts are seen.
 
 import { $, listen, numberIn } from "../../../../view/template/elements.js";
-import { blockOf } from "../../../../view/template/moves/block.js";
+import { blockOf } from "../../../../view/template/moves/rows.js";
 import { add, bounds, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
-import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/shapes.js";
-import { hex, rgb, solidOf, wordOf } from "../../../../view/template/picture/solids.js";
+import { arrowsOf, hex, rgb, solidOf, surfaceColours, surfacesOf, wordOf } from "../../../../view/template/picture/shapes.js";
 import { newest } from "../line.js";
 import { faceMet } from "../scene/face-tree.js";
 import { store, subscribe, update } from "../store.js";

@@ -1,11 +1,10 @@
 // Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
 
 import { alike, nextFrame } from "../../../../view/template/elements.js";
-import { cameraOf, placeOn } from "../../../../view/template/picture/camera.js";
+import { cameraOf, HALF_HEIGHT, placeOn } from "../../../../view/template/picture/camera.js";
 import { cardOf, frameOf, outgrown, outlive, sizeOf } from "../../../../view/template/picture/gl.js";
-import { add, bounds, carried, cornersOf, dot, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
-import { bodiesOf, boxEdges, cutsOf, FROM_BELOW, ON_PLATE, planesOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
-import { bodyOf, clipOf, MOST_CUTS, solidOf } from "../../../../view/template/picture/solids.js";
+import { add, bounds, carried, cornersOf, dot, IDENTITY, length, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
+import { bodiesOf, bodyOf, boxEdges, clipOf, cutsOf, FROM_BELOW, MOST_CUTS, ON_PLATE, planesOf, solidOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { markedOver } from "../parts/marks-panel.js";
 import { piecesOn } from "../parts/pieces.js";
 import { paintedRed, planeBefore, standingBy } from "./triangles.js";
@@ -14,7 +13,7 @@ const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156], PLANE_C
 const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
 const MOST_FACES = 2000000; // of all copies together; those beyond are drawn as boxes
 const ON_SECTION_MM = 1e-3;
-const ON_FACES = 1e-4; // in depth, by which lines are seen before what they lie on
+const ON_FACES = 1e-4; // in depth, by which lines are seen before what they lie on, and what is cut away before the plate
 
 /** Corners of boxes about all that is drawn but the table, the model in the middle of that: the model and its copies, or its parts, and walls, planes, marks and what is in the way. */
 export function placesDrawn({ box, place = [0, 0, 0], copies = [], pieces, shifts, walls, pedestal, extras }) {
@@ -84,7 +83,7 @@ export function pictureOf(canvas, camera) {
     if (gl.isContextLost()) return;
     renew();
     const size = sizeOf(canvas), plate = camera.seen(size), seenAs = (matrix) => plate(multiply(moved(scene.place), matrix)), below = camera.eye()[2] < 0;
-    const flat = seenAs(IDENTITY), ground = plate(IDENTITY), ghost = scene.walls ? FAINT : 0, open = clipOf(flat.toEye, scene.section), capped = { ...open, capped: Boolean(scene.section) && !ghost };
+    const flat = seenAs(IDENTITY), ground = plate(IDENTITY), ghost = scene.walls ? FAINT : 0, open = { ...clipOf(flat.toEye, scene.section), lift: scene.section ? ON_FACES : 0 }, capped = { ...open, capped: Boolean(scene.section) && !ghost };
     if (outgrown(canvas)) [canvas.width, canvas.height] = size;
     frame.begin(...size);
     if (!below) card.table.draw(ground, { lift: ON_PLATE });
@@ -202,6 +201,8 @@ export function pictureOf(canvas, camera) {
       ask();
     },
     eye: () => sub(camera.eye(), scene.place),
+    /** mm that a pixel shows at a place. */
+    pixelAt: (place) => (2 * HALF_HEIGHT * length(sub(camera.eye(), add(place, scene.place)))) / canvas.clientHeight,
     carried: (place) => carried(scene.matrix, place),
     box: () => scene.box,
     matrix: () => scene.matrix,
