@@ -35,7 +35,6 @@ WIDTH, HEIGHT = 640, 320
 
 def main() -> None:
     """Process the model, and draw each value."""
-    OUT.mkdir(exist_ok=True)
     profile = load()
     mesh, _ = read_mesh(locate(MODEL))
     decomposition = decompose(mesh, MODEL, profile, SearchRequest(price=pricing(profile)))
