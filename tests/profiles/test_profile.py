@@ -149,7 +149,7 @@ def test_a_share_is_also_read_as_a_percentage() -> None:
             "process.infill_density=0,35",
             'process.infill_density is "0,35": it must be a number from 0 to 1 or a percentage: write 0.35',
         ),
-        ("process.bridge_flow=3", "process.bridge_flow is 3: it must be a number from 0.3 to 2 or a percentage"),  # 3% is not allowed
+        ("process.bridge_flow=3", "process.bridge_flow is 3: it must be a number from 0.3 to 2 or a percentage"),
         (
             "process.bridge_flow=30",
             "process.bridge_flow is 30: it must be a number from 0.3 to 2 or a percentage: write 30%",
