@@ -186,7 +186,7 @@ class Brushed:
 
     def __post_init__(self) -> None:
         """Raises ValueError for text that is not a list of face numbers."""
-        if not FACE_NUMBERS.fullmatch(self.numbers):
+        if not FACE_NUMBERS.fullmatch(self.numbers) or any(last < first for first, last in self.ranges):
             raise ValueError('numbers and ranges of faces are expected, as "0-11 15 20-24"')
 
     @classmethod

@@ -79,11 +79,14 @@ def _sentence(problem: Any, text: str, root: type[BaseModel], prefix: str) -> st
 def _share_problem(given: Any, field: FieldInfo) -> str:
     """The value of a share and what it must be: a number for a file or an option, a percentage for the page."""
     number, meant = given if isinstance(given, float | int) else None, ""
-    most = next(most for rule in field.metadata for name in ("le", "lt") if (most := _bound(rule, name)))
+    least, most = (
+        next(bound for rule in field.metadata for name in names if (bound := _bound(rule, name)) is not None)
+        for names in (("ge", "gt"), ("le", "lt"))
+    )
     if isinstance(given, str) and DECIMAL_COMMA.fullmatch(given.strip()):
         number = float(given.strip().replace(",", "."))
         meant = f": write {number:g}"
-    elif number is not None and most < number <= 100.0 * most:
+    elif number is not None and most < number and 100.0 * least <= number <= 100.0 * most:
         meant = f": write {number:g}%"
     terminal = f"{_shown(given)}: it must be {allowed(field)} or a percentage{meant}"
     shown = _shown(given) if number is None else f"{100.0 * number:.6g} %"

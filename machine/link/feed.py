@@ -236,7 +236,8 @@ class Feed:
         self.set_state(PrintState.FINISHING)
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send("M155 S0")
-        for own in (*self.pending.next_lines(self.modal), *self.pending.undo_overrides()):  # no override is undone that was not sent
+        # first what is still to be sent: an override that was not sent must not be undone
+        for own in (*self.pending.next_lines(self.modal), *self.pending.undo_overrides()):
             exchange.send(own)
         self._end_moves()
         self.finished = True

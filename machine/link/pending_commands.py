@@ -153,6 +153,14 @@ class PendingCommands:
         undone = [f"{name} S100" for name, value in pairs if value != 100.0]
         return [*undone, offset_undone(self.z_offset_mm, self.babystep)] if self.z_offset_mm else undone
 
+    @property
+    def kept_offset(self) -> str:
+        """A sentence on a Z offset that the firmware keeps for the next print if this one stops now; "" for none."""
+        if not self.z_offset_mm or not self.babystep.endswith(KEEPS_OFFSET):
+            return ""
+        undone = offset_undone(self.z_offset_mm, self.babystep)
+        return f"the printer keeps the Z offset of {self.z_offset_mm:+g} mm: before another print send it {undone}"
+
     def _queue_line(self, text: str, state: PrintState) -> None:
         why = line_refusal(text, self.axes, state is PrintState.PAUSED, self.limit)
         self.message = "" if why is None else f"not sent: {text.strip()[:40]!r}: {why}"

@@ -39,6 +39,7 @@ class Outcome:
     # After a cancel: whether the printer's report proves it. None: the program ended by itself, or nothing of it was sent.
     heaters_off: bool | None = None
     halted: str = ""  # after a halt: what makes the printer print again
+    kept_offset: str = ""  # after a cancel: a Z offset that outlasts the print, in words
 
 
 def print_lines(
@@ -235,4 +236,5 @@ class _Print:
             warnings=tuple(feed.reports.warnings),
             heaters_off=None if heaters is None else heaters is not Heaters.UNPROVED,
             halted=self._guard.revival if heaters is Heaters.HALTED else "",
+            kept_offset="" if feed.finished or heaters is Heaters.HALTED else feed.pending.kept_offset,
         )

@@ -149,6 +149,11 @@ def test_a_share_is_also_read_as_a_percentage() -> None:
             "process.infill_density=0,35",
             'process.infill_density is "0,35": it must be a number from 0 to 1 or a percentage: write 0.35',
         ),
+        ("process.bridge_flow=3", "process.bridge_flow is 3: it must be a number from 0.3 to 2 or a percentage"),
+        (
+            "process.bridge_flow=30",
+            "process.bridge_flow is 30: it must be a number from 0.3 to 2 or a percentage: write 30%",
+        ),
         ("process.infill=20%", "process.infill is not a key of a profile: did you mean process.infill_density?"),
         (
             "process.outer_wall_line_width_mm=2",

@@ -110,7 +110,7 @@ class Keyboard:
             self._tell(STOP)
 
     def _cancel(self) -> None:
-        self._sure = True
+        self._sure, self._leaving = True, False
         self._tell(CANCELLING if self._server else SURE)
 
     def _cancel_now(self) -> None:

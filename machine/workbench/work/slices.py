@@ -147,14 +147,15 @@ def open_gcode(tell: Tell, request: ModelRequest, page: Path, gcode: Path) -> Sl
     program, profile = loaded.program, loaded.profile
     if not len(program.run.program.line):
         raise GcodeError(f"{request.name} holds no move: there is nothing to show")
+    drawn = print_page(request.name, program, profile, known=loaded.machine_known)
     content = ("\n".join(program.lines) + "\n").encode("utf-8", "replace")
-    page.write_bytes(print_page(request.name, program, profile, known=loaded.machine_known))
+    page.write_bytes(drawn)
     gcode.write_bytes(content)
     values, note = summary(program.run), "" if loaded.machine_known else "it does not tell its machine"
     return Sliced(
         page,
         gcode,
-        sha256(content).hexdigest()[:16],
+        sha256(drawn + content).hexdigest()[:16],  # the same file may be tried again, for another machine
         values["time_s"],
         values["filament_mm"],
         known_findings(program.lines, profile, program.run.findings),

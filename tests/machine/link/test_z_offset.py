@@ -77,3 +77,14 @@ def test_a_z_offset_asked_for_after_the_last_command_is_not_taken_back_unsent() 
     watcher = watched({len(PROGRAM) - 4: (Command.BABYSTEP, -0.05)})  # as the last commands fill the window
     watcher.run(PROGRAM)
     assert [line for line in watcher.lines() if line.startswith("M290")] == ["M290 Z-0.050", "M290 Z0.050"]
+
+
+@pytest.mark.parametrize(("machine", "sentence"), [
+    ("generic_ac", ""),  # homing resets it
+    ("fractal5pro", "the printer keeps the Z offset of -0.05 mm: before another print send it SET_GCODE_OFFSET Z_ADJUST=0.050"),
+])  # fmt: skip
+def test_a_cancelled_print_tells_of_a_z_offset_that_the_printer_keeps(machine: str, sentence: str) -> None:
+    profile = load(machine=machine)
+    watcher = watched({100: (Command.BABYSTEP, -0.05), 200: Command.CANCEL}, profile=profile)
+    outcome = watcher.run(letters(profile))
+    assert (outcome.cancelled, outcome.kept_offset) == (True, sentence)

@@ -11,10 +11,11 @@ from starlette.requests import Request
 from starlette.responses import FileResponse
 
 from machine.dryrun.findings import Finding, known_findings
+from machine.pipeline.requests import ModelRequest
 from machine.program import Alternative
 from machine.workbench.web.server import gcode
 from machine.workbench.web.snapshot import SLICE_AGAIN, SUPPORT_ON, verdict_of
-from machine.workbench.work.slices import Sliced, walls
+from machine.workbench.work.slices import Sliced, open_gcode, walls
 from profiles.errors import PlanError
 from profiles.profile import load
 from slicer.slice import slice_parts
@@ -96,3 +97,12 @@ def test_what_hangs_gets_a_button_that_switches_support_on_where_it_is_off() -> 
 def test_slices_of_another_bench_are_to_be_made_again() -> None:
     verdict = verdict_of((CRASH,), load(), 0.0, out_of_date=True)
     assert (verdict["kind"], verdict["remedy"]) == ("stale", SLICE_AGAIN)
+
+
+def test_a_gcode_file_that_is_tried_for_another_machine_has_another_page(tmp_path: Path) -> None:
+    file = tmp_path / "box.gcode"
+    file.write_text("G21\nG90\nM83\nG28\nM104 S210\nM109 S210\nG1 Z0.3 F600\nG1 X10 E1 F600\nM104 S0\n")
+    requests = [ModelRequest(str(file), load(machine=machine)) for machine in ("generic_ac", "gen5x")]
+    first, second = (open_gcode(print, request, tmp_path / "page", tmp_path / "copy") for request in requests)
+    assert first.known.profile.machine != second.known.profile.machine
+    assert first.key != second.key

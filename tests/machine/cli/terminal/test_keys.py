@@ -69,6 +69,17 @@ def test_a_question_that_nobody_answers_is_void_after_a_while() -> None:
     assert (board.hint, control.take()) == (SURE, None)
 
 
+def test_an_expired_question_whether_to_leave_does_not_change_the_answers_to_the_next_one() -> None:
+    control, clock = Control(), [0.0]
+    board = Keyboard(control, "moonraker:box", now_s=lambda: clock[0])
+    board.press("q")
+    clock[0] = HINT_S
+    board.press("c")
+    assert board.hint == CANCELLING  # c or y cancels
+    board.press("y")
+    assert (control.take(), board.left()) == (PendingCommand(Command.CANCEL), False)
+
+
 def test_the_question_goes_away_with_the_answer() -> None:
     assert hint_after("c", "n") == ""
 
