@@ -1,6 +1,6 @@
 // Clicks: what the next click on the model is for, and what it does.
 
-import { $, disable, listen, notice, numberIn, onKeys, pressed, toggle } from "../../../../view/template/elements.js";
+import { $, listen, notice, numberIn, onKeys, pressed, toggle } from "../../../../view/template/elements.js";
 import { layFacet } from "../model/model.js";
 import { markAt, markWord } from "../parts/marks-panel.js";
 import { openMenu } from "../parts/parts-panel.js";
@@ -11,7 +11,6 @@ import { brushOf } from "./brush.js";
 import { measureOf } from "./measure.js";
 import { met } from "./triangles.js";
 
-const NEEDS_PICTURE = ["brush", "faces", "box", "measure"];
 /** Of what a click can be for: the button that asks for it, and what is said then. */
 const WANTED = {
   lay: ["lay", () => "Click a lit face: it can rest on that."], snap: ["snap", () => "Click the face whose plane it is to take."],
@@ -22,9 +21,8 @@ const WANTED = {
   measure: ["measure", () => "Click two points; corners attract. Esc ends it."],
 };
 
-export function clicksOf(picture) {
+export function clicksOf() {
   for (const [clicks, [id]] of Object.entries(WANTED)) listen("click", { [id]: () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null }) });
-  NEEDS_PICTURE.forEach((clicks) => disable({ [WANTED[clicks][0]]: !picture }));
   listen("click", { "mark-erase": () => pressed("mark-erase", $("mark-erase").getAttribute("aria-pressed") !== "true") });
   listen("change", { "mark-kind": () => update({ corner: null }) });
   subscribe((now, before) => {
@@ -69,11 +67,8 @@ export function handsOf(camera, picture) {
     options[next % options.length].selected = true;
     $("section-along").dispatchEvent(new Event("change"));
   };
-  const tool = (id, tab) => () => {
-    if (tab) $(tab).click();
-    $(id).click();
-  };
-  onKeys({ b: tool("mark-brush", "tab-parts"), m: tool("measure"), x: nextSection, "[": widen(1 / 1.2), "]": widen(1.2) },
+  const clickAll = (...ids) => () => ids.forEach((id) => $(id).click());
+  onKeys({ b: clickAll("tab-parts", "mark-brush"), m: clickAll("measure"), x: nextSection, "[": widen(1 / 1.2), "]": widen(1.2) },
     () => $("keys").open || !store.triangles || document.activeElement?.closest("[data-typing]"));
   globalThis.view = { camera, picture }; // for whoever tries the page from a console
   const asked = (event) => {
