@@ -27,7 +27,8 @@ OUTSIDE = """(() => { const [a, b] = ['plane-tools', 'scene'].map((id) => $(id).
 # Knobs of the plane that the tools or another knob stand over.
 COVERED = """[...document.querySelectorAll('#handles button')].filter((knob) => { const a = knob.getBoundingClientRect();
   const over = (b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
-  return [...document.querySelectorAll('#plane-tools, #handles button')].some((one) => one !== knob && over(one.getBoundingClientRect()));
+  const others = [...document.querySelectorAll('#plane-tools, #handles button')].filter((one) => one !== knob);
+  return others.some((one) => over(one.getBoundingClientRect()));
 }).map((knob) => knob.id)"""
 UNDO = "$('undo').getAttribute('aria-label')"
 SMALL = (900, 560)

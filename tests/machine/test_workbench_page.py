@@ -38,10 +38,10 @@ def choose(browser: "Browser | Firefox", name: str, content: bytes) -> None:
 def open_model(browser: Browser, bench: Running, name: str, content: bytes) -> None:
     browser.open(bench.address)
     browser.wait(f"document.documentElement.dataset.version && {IDLE}")  # all of what lies there is shown
-    before = browser.value("document.documentElement.dataset.version")
+    before, root = browser.value("document.documentElement.dataset.version"), "document.documentElement.dataset"
     choose(browser, name, content)
     opened = f"$('title').textContent === {json.dumps(name)} && $('undo').ariaLabel.startsWith('undo: open')"
-    browser.wait(f"document.documentElement.dataset.shown && document.documentElement.dataset.version > {before} && {opened} && {IDLE}")
+    browser.wait(f"{root}.shown && {root}.version > {before} && {opened} && {IDLE}")
 
 
 def saved(browser: Browser | Firefox, button: str) -> str:

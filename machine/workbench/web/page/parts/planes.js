@@ -161,11 +161,7 @@ export function handlesOf(picture) {
     const normal = unit(turned(rotated(cross(side, plane.normal), Math.atan2(mm, arm)), plane.normal));
     return { normal, offset_mm: dot(normal, middle) };
   };
-  const taken = (knob) => {
-    const plane = store.hand?.wanted || planeNow();
-    return { plane, middle: section.centre_mm, arm: far(), side: sideOf(knob, plane), tilts: knob.tilts };
-  };
-  const stepOf = ({ tilts }) => (tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * far());
+  const taken = ({ tilts }, plane = store.hand?.wanted || planeNow()) => ({ plane, middle: section.centre_mm, arm: far(), side: sideOf({ tilts }, plane), tilts });
   KNOBS.forEach((knob) => gripOf($(knob.id), {
     take: (event) => {
       const along = alongWay(picture, placeOf(knob), planeNow().normal, event), held = taken(knob);
@@ -173,7 +169,7 @@ export function handlesOf(picture) {
     },
     hold: holdPlane, drop: leavePlane,
     put: () => { if (store.hand) putPlane(store.hand.plane); },
-    step: (sign) => moved(taken(knob), sign * stepOf(knob)),
+    step: (sign) => moved(taken(knob), sign * (knob.tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * far())),
   }));
   const place = () => {
     $("handles").hidden = !section || !planeNow() || isLocked() || Boolean(store.clicks);

@@ -1,7 +1,7 @@
 // Clicks: what the next click on the model is for, and what it does; the cross in the corner of the picture, which tells where x, y and z are
 // and looks along the one that is clicked; and the section view, the inside of the model, seen where a plane cuts it away.
 
-import { $, disable, listen, notice, numberIn, onKeys, pressed, toggle } from "../../../../view/template/elements.js";
+import { $, listen, notice, numberIn, onKeys, pressed, toggle } from "../../../../view/template/elements.js";
 import { cross, dot } from "../../../../view/template/picture/math.js";
 import { sectionAsked } from "../../../../view/template/picture/shapes.js";
 import { layFacet } from "../model/model.js";
@@ -13,7 +13,6 @@ import { store, subscribe, update } from "../store.js";
 import { brushOf, measureOf } from "./tools.js";
 import { met } from "./triangles.js";
 
-const NEEDS_PICTURE = ["brush", "faces", "box", "measure"];
 /** Of what a click can be for: the button that asks for it, what is said then, and what it does where it meets the model. */
 const WANTED = {
   lay: ["lay", () => "Click a lit face: it can rest on that."], snap: ["snap", () => "Click the face whose plane it is to take.", ({ face }, picture) => snapTo(face, picture)],
@@ -24,9 +23,8 @@ const WANTED = {
   measure: ["measure", () => "Click two points; corners attract. Esc ends it."],
 };
 
-export function clicksOf(picture) {
+export function clicksOf() {
   for (const [clicks, [id]] of Object.entries(WANTED)) listen("click", { [id]: () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null }) });
-  NEEDS_PICTURE.forEach((clicks) => disable({ [WANTED[clicks][0]]: !picture }));
   listen("click", { "mark-erase": () => pressed("mark-erase", $("mark-erase").getAttribute("aria-pressed") !== "true") });
   listen("change", { "mark-kind": () => update({ corner: null }) });
   subscribe((now, before) => {
@@ -71,11 +69,8 @@ export function handsOf(camera, picture) {
     options[next % options.length].selected = true;
     $("section-along").dispatchEvent(new Event("change"));
   };
-  const tool = (id, tab) => () => {
-    if (tab) $(tab).click();
-    $(id).click();
-  };
-  onKeys({ b: tool("mark-brush", "tab-parts"), m: tool("measure"), x: nextSection, "[": widen(1 / 1.2), "]": widen(1.2) },
+  const clickAll = (...ids) => () => ids.forEach((id) => $(id).click());
+  onKeys({ b: clickAll("tab-parts", "mark-brush"), m: clickAll("measure"), x: nextSection, "[": widen(1 / 1.2), "]": widen(1.2) },
     () => $("keys").open || !store.triangles || document.activeElement?.closest("[data-typing]"));
   globalThis.view = { camera, picture }; // for whoever tries the page from a console
   const asked = (event) => {
