@@ -73,7 +73,7 @@ def test_plates_and_settings_of_a_slicer_file_are_taken_by_buttons(browser: Brow
     open_model(browser, bench, "two.3mf", (tmp_path / "two.3mf").read_bytes())
     browser.click("#tab-model")
     browser.wait("$('size-x').value === '20.00'")
-    assert "another can be taken below: 2" in browser.value("$('model-notes').textContent")
+    assert "choose another one below: 2" in browser.value("$('model-notes').textContent")
     browser.click("#plates button:nth-child(2)")
     browser.wait("$('size-x').value === '30.00' && $('plates').children[1].disabled")
     browser.click("#file-settings")
