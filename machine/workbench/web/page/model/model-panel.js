@@ -58,13 +58,10 @@ function tellFile({ plates, has_settings: has, settings_note: note }) {
 
 /** A file may be dropped anywhere on the page. */
 function dropping() {
-  const over = (whether) => $("scene").classList.toggle("over", whether);
-  addEventListener("dragover", (event) => { event.preventDefault(); over(true); });
-  addEventListener("dragleave", () => over(false));
-  addEventListener("drop", (event) => {
+  for (const name of ["dragover", "dragleave", "drop"]) addEventListener(name, (event) => {
     event.preventDefault();
-    over(false);
-    takeFiles([...event.dataTransfer.files]);
+    $("scene").classList.toggle("over", name === "dragover");
+    if (name === "drop") takeFiles([...event.dataTransfer.files]);
   });
 }
 
@@ -96,8 +93,8 @@ export function sizePanel() {
 const MIDDLE = [0, 0], STEP_MM = 1, LARGE_STEP_MM = 10; // the latter with Shift held
 const WAYS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
+const stepOf = ({ shiftKey }) => (shiftKey ? LARGE_STEP_MM : STEP_MM);
 const placeNow = () => store.placing || store.state.place_mm;
-const rounded = (place, step) => place.map((x) => step * Math.round(x / step));
 
 /** Has the model stand somewhere else; the picture has it there until that is done or refused. */
 function put(place) {
@@ -123,7 +120,7 @@ export function placePanel(picture) {
   subscribe(() => {
     const now = JSON.stringify(placeNow());
     if (store.state.copies_mm) copies = store.state.copies_mm.map((place) => [...place, 0]); // none are known yet of a model that has just been turned
-    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])));
+    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])), [...placeNow(), 0]);
     if (now === told) return;
     told = now;
     fields.forEach((field, axis) => { field.value = placeNow()[axis]; });
@@ -146,11 +143,11 @@ function handleOf(picture) {
     },
     move: ({ from, stood }, event) => {
       const to = onPlate(event);
-      if (to) update({ placing: rounded(stood.map((x, axis) => x + to[axis] - from[axis]), event.shiftKey ? LARGE_STEP_MM : STEP_MM) });
+      if (to) update({ placing: stood.map((x, axis) => stepOf(event) * Math.round((x + to[axis] - from[axis]) / stepOf(event))) });
     },
     put: () => { if (store.placing) put(store.placing); },
     drop: () => update({ placing: null }),
-    step: (sign, { key, shiftKey }) => update({ placing: WAYS[key].map((way, axis) => placeNow()[axis] + way * (shiftKey ? LARGE_STEP_MM : STEP_MM)) }),
+    step: (sign, event) => update({ placing: WAYS[event.key].map((way, axis) => placeNow()[axis] + way * stepOf(event)) }),
   });
   picture.drawn.push(() => {
     const shown = store.tab === "model" && store.state?.model && store.triangles && store.clicks !== "lay";

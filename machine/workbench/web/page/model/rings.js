@@ -21,10 +21,7 @@ export function ringsOf(picture) {
     const [least, most] = picture.box();
     return { centre: scaled(add(least, most), 0.5), radius: RING_REACH * store.triangles.reach_mm };
   };
-  const told = (axis, deg) => {
-    const group = groups.find(({ dataset }) => dataset.ring === axis);
-    Object.assign(group, { ariaValueNow: deg, ariaValueText: `${deg} degrees` });
-  };
+  const told = (axis, deg) => Object.assign(groups.find(({ dataset }) => dataset.ring === axis), { ariaValueNow: deg, ariaValueText: `${deg} degrees` });
   const preview = (axis, ring, deg) => {
     turning = { axis, ring, deg };
     told(axis, deg);
@@ -64,11 +61,9 @@ export function ringsOf(picture) {
       const points = ringPoints(RING_AXES[group.dataset.ring], ring), middle = length(sub(eye, ring.centre));
       const seen = points.map((place) => ({ at: picture.placeOf(place), near: length(sub(eye, place)) < middle }));
       group.classList.toggle("turning", Boolean(turning) && turning.axis === group.dataset.ring);
-      const parts = { far: () => true, near: ({ near }) => near, reach: () => true };
-      for (const [name, wanted] of Object.entries(parts)) group.querySelector(`.${name}`).setAttribute("d", pathOf(seen, wanted));
+      for (const name of ["far", "near", "reach"]) group.querySelector(`.${name}`).setAttribute("d", pathOf(seen, ({ near }) => near || name !== "near"));
       const label = seen.reduce((best, spot) => (spot.at && spot.near && (!best || spot.at[1] < best[1]) ? spot.at : best), null) || [-99, -99];
-      group.querySelector("text").setAttribute("x", label[0]);
-      group.querySelector("text").setAttribute("y", label[1]);
+      ["x", "y"].forEach((name, k) => group.querySelector("text").setAttribute(name, label[k]));
     });
     showSweep(picture, turning);
   });
@@ -79,10 +74,7 @@ export function ringsOf(picture) {
 
 const onRing = (axis, { centre, radius }, angle) => ringOf(centre, axis, radius, 1, angle)[0];
 
-const ringPoints = (axis, { centre, radius }) => {
-  const points = ringOf(centre, axis, radius, RING_STEPS);
-  return [...points, points[0]];
-};
+const ringPoints = (axis, ring) => [...ringOf(ring.centre, axis, ring.radius, RING_STEPS), onRing(axis, ring, 0)];
 
 /** What a hand that takes a ring holds: the angle at which it has taken it (from), and how many degrees an event has turned it since: the ring's place
  * that is seen nearest to the hand follows it, of those within a quarter turn of the last one, so that it does not jump to the other side. */
@@ -105,13 +97,8 @@ function graspOf(picture, axis, ring, event) {
 
 /** An SVG path along the places that are seen and wanted. */
 function pathOf(seen, wanted) {
-  let text = "", open = false;
-  for (const spot of seen) {
-    const drawn = spot.at && wanted(spot);
-    if (drawn) text += `${open ? "L" : "M"}${spot.at[0].toFixed(1)} ${spot.at[1].toFixed(1)}`;
-    open = drawn;
-  }
-  return text;
+  const drawn = (spot) => spot?.at && wanted(spot);
+  return seen.map((spot, k) => (drawn(spot) ? `${drawn(seen[k - 1]) ? "L" : "M"}${spot.at.map((x) => x.toFixed(1)).join(" ")}` : "")).join("");
 }
 
 /** The sector by which the model is turned just now, and its angle. */
@@ -121,9 +108,8 @@ function showSweep(picture, turning) {
   if (!turning) return;
   const { axis, ring, deg } = turning, steps = Math.max(Math.ceil(Math.abs(deg) / 4), 1);
   const places = Array.from({ length: steps + 1 }, (_, k) => picture.placeOf(onRing(RING_AXES[axis], ring, ring.from + (k / steps) * deg * RAD)));
-  const middle = picture.placeOf(ring.centre), end = places[steps];
-  if (!middle || places.some((place) => !place)) return;
-  $("ring-sweep").setAttribute("d", `M${[middle, ...places].map((place) => place.map((x) => x.toFixed(1)).join(" ")).join("L")}Z`);
-  $("ring-told").setAttribute("x", end[0]);
-  $("ring-told").setAttribute("y", end[1] - 10);
+  const sector = [picture.placeOf(ring.centre), ...places].map((at) => ({ at }));
+  if (!sector.every(({ at }) => at)) return;
+  $("ring-sweep").setAttribute("d", `${pathOf(sector, () => true)}Z`);
+  ["x", "y"].forEach((name, k) => $("ring-told").setAttribute(name, places[steps][k] - 10 * k));
 }

@@ -95,7 +95,7 @@ export function settingsPanel() {
   });
   for (const level of LEVELS) listen("click", { [`level-${level}`]: () => { kept.keep({ level }); list(); } });
   for (const kind of KINDS) listen("click", { [`reset-${kind}`]: () => send({ do: "reset", kind }) });
-  onNew(({ given, part_settings: own, parts, model, rotation, stops, copies }) => [given, own, parts, model?.name, rotation, stops, copies], () => {
+  onNew(({ given, part_settings: own, parts, model, rotation, stops, copies, beside }) => [given, own, parts, model?.name, rotation, stops, copies, beside], () => {
     partsToChoose(store.state);
     fetchAll();
   });
