@@ -89,7 +89,9 @@ def drawn(bench: Running, state: dict[str, Any]) -> tuple[int, float]:
     return int(faces), round(float(vertices[:, 2].max()), 6)
 
 
-def test_the_g_code_of_a_plate_is_that_of_the_command_line_and_the_plate_is_kept(bench: Running, folder: Path) -> None:
+def test_the_g_code_of_a_plate_is_that_of_the_command_line_and_the_plate_is_kept(
+    bench: Running, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     with bench.line() as page:
         bench.send(folder / "box.stl")
         assert add(bench, folder / "tee.stl")[0] == 200
@@ -112,6 +114,10 @@ def test_the_g_code_of_a_plate_is_that_of_the_command_line_and_the_plate_is_kept
         project.write_bytes(bench.ask("project.3mf")[1])
         assert main(["export", "plate.3mf", "-o", "again.gcode"]) == 0
         assert (folder / "again.gcode").read_bytes() == gcode
+        assert main(["export", "plate.3mf", "--copies", "2", "-o", "again.gcode"]) == 1
+        assert "plate.3mf says how many of each model stand on its plate" in capsys.readouterr().err
+        page.do("compare")
+        page.until(lambda state: len(state["compared"]) > 1)
         assert main(["save", "plate.3mf", "-o", "saved.3mf"]) == 0
         bench.send(folder / "tee.stl")
         page.until(lambda state: state["model"]["name"] == "tee.stl" and on_plate(state) == [])
