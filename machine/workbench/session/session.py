@@ -78,7 +78,8 @@ class Session(SessionBase):
         self.keeping = Keeping(self)
         self.benches: list[dict[str, Any]] = []
         self.unscaled: OfUnknownUnit | None = None
-        self._opened = self.bench, self.bench  # before the model was opened that was opened last, and after
+        self._opened: tuple[Bench, Bench] | None = None  # before and after a model was opened over another one
+        self.followers.append(self._forget_opened)
         self.gcode: Sliced | None = None  # a file that a page has sent
         self.settings_note = ("", "")
         self._to_begin: dict[object, str] = {}  # names of queued commands that begin long work
@@ -124,20 +125,25 @@ class Session(SessionBase):
             bench = for_another_model(before) if anew else before
             model = await self._read(path, name, bench.profile, plate, asks=True)
         await self._replace(f"open {name}", with_model(bench, model))
-        self._opened = before, self.bench
+        self._opened = (before, self.bench) if before.model is not None else None
+
+    def _forget_opened(self) -> None:
+        """Forget which model was opened over another one as soon as the bench is changed."""
+        if self._opened is not None and self._opened[1] is not self.bench:
+            self._opened = None
 
     @property
     def addable(self) -> str:
         """Name of the model that has just been opened over another one, beside which it can be put; "" if there is none."""
-        before, opened = self._opened
-        return opened.model.name if opened is self.bench and opened.model is not None and before.model is not None else ""
+        model = None if self._opened is None else self.bench.model
+        return "" if model is None else model.name
 
     async def add_opened(self) -> None:
         """Put the model that has just been opened beside the previous one, and that on the bench again. Raises UserError."""
-        before, opened = self._opened
-        if not self.addable or opened.model is None:
+        model = self.bench.model
+        if self._opened is None or model is None:
             raise PlanError("no model has just been opened over another one, so none can be put beside that")
-        await self._add(before, opened.model.path, opened.model.name)
+        await self._add(self._opened[0], model.path, model.name)
 
     async def add_model(self, path: Path, name: str) -> None:
         """Put the model of a file on the plate, beside that on the bench. Raises UserError."""
@@ -209,7 +215,7 @@ class Session(SessionBase):
         await self.open_model(locate(name), name)
         if (plan := plan_beside(name)) is not None:
             await self.open_plan(plan)
-        self._opened = before, self.bench
+        self._opened = (before, self.bench) if before.model is not None else None
 
     async def open_project(
         self, path: Path, name: str, taken_over: Callable[[Project], Project] = lambda project: project

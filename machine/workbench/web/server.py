@@ -355,9 +355,10 @@ def _others_key(session: Session) -> str:
 
 
 async def _others(session: Session, request: Request) -> Response:
-    assert session.standing.result is not None
-    assert session.standing.result.others is not None
-    return FileResponse(session.standing.result.others, media_type=BYTES)
+    standing = session.standing.result  # its file exists as long as it
+    assert standing is not None
+    assert standing.others is not None
+    return Response(await asyncio.to_thread(standing.others.read_bytes), media_type=BYTES)
 
 
 async def _facets(session: Session, request: Request) -> Response:
