@@ -103,7 +103,8 @@ class Uploads:
             except PlanError:
                 rows.append({"key": folder.name, "name": "", "parts": 0, "written_s": folder.stat().st_mtime})
             else:
-                rows.append({"key": folder.name, "name": project.name, "parts": project.parts, "written_s": project.written_s})
+                name = ", ".join(project.names)
+                rows.append({"key": folder.name, "name": name, "parts": project.parts, "written_s": project.written_s})
         return JSONResponse(rows)
 
     async def open_kept(self, session: Session, request: Request) -> Response:

@@ -121,6 +121,7 @@ def test_the_g_code_of_a_plate_is_that_of_the_command_line_and_the_plate_is_kept
         assert main(["save", "plate.3mf", "-o", "saved.3mf"]) == 0
         bench.send(folder / "tee.stl")
         page.until(lambda state: state["model"]["name"] == "tee.stl" and on_plate(state) == [])
+        assert json.loads(bench.ask("kept")[1])[0]["name"] == "box.stl, tee.stl"
         bench.send(folder / "saved.3mf")
         page.until(lambda state: on_plate(state) == [("tee.stl", 2)])
         sliced(page)
