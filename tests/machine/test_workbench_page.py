@@ -24,14 +24,14 @@ UNITS = ["in metres", "in inches", "in centimetres"]  # that make it a size to p
 IDLE = "document.documentElement.dataset.busy === ''"
 
 
-def choose(browser: "Browser | Firefox", name: str, content: bytes) -> None:
+def choose(browser: "Browser | Firefox", name: str, content: bytes, field: str = "file") -> None:
     """A file chosen as a person does, and shown."""
     browser.value(
         f"""{{ const bytes = Uint8Array.from({list(content)}), chosen = new DataTransfer();
         chosen.items.add(new File([bytes], {json.dumps(name)}));
         document.documentElement.dataset.shown = '';
-        $('file').files = chosen.files;
-        $('file').dispatchEvent(new Event('change')); }}"""
+        $('{field}').files = chosen.files;
+        $('{field}').dispatchEvent(new Event('change')); }}"""
     )
 
 

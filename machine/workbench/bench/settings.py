@@ -248,7 +248,9 @@ def export_command(bench: Bench) -> str:
         return ""
     given, stem = bench.given, file_stem(bench)
     named = [(kind, getattr(given, kind)) for kind in DEFAULTS if getattr(given, kind) != DEFAULTS[kind]]
-    words = ["tiltprint", "export", bench.model.name, *(word for kind, name in named for word in (f"--{kind}", name))]
+    plate = [(bench.model.name, bench.copies), *((model.name, copies) for model, copies in bench.beside)]
+    models = [f"{name}:{copies}" if bench.beside and copies > 1 else name for name, copies in plate]
+    words = ["tiltprint", "export", *models, *(word for kind, name in named for word in (f"--{kind}", name))]
     settings = list(given.settings)
     if not bench.planned and bench.turned is not None:
         settings = [setting for setting in settings if key_of(setting) != "process.rotate_deg"]
@@ -262,7 +264,7 @@ def export_command(bench: Bench) -> str:
         words += ["--parts", "1", "--as-is"]
         for own in bench.profile.parts:
             words += ["--part", option(own)]
-    if bench.copies != 1:
+    if bench.copies != 1 and not bench.beside:
         words += ["--copies", str(bench.copies)]
     words += [word for stop in bench.stops for word in (f"--{stop.option}", stop.at)]
     return join([*words, "-o", f"{stem}.gcode"])

@@ -208,6 +208,9 @@ def snapshot(session: Session) -> dict[str, Any]:
         "copies": bench.copies,
         "copies_mm": standing and [[round(x, 3), round(y, 3)] for x, y in standing.copies_mm],
         "copies_told": _copies_told(session),
+        "beside": [{"name": other.name, "copies": copies} for other, copies in bench.beside],
+        "others": standing and standing.others_key,
+        "addable": session.addable,
         "place_mm": bench.profile.process.place_mm,
         "machine": machine_bodies(bench.profile.machine, known=True),
         "benches": session.benches,
@@ -262,8 +265,8 @@ def _stop(stop: Stop) -> dict[str, str]:
 
 
 def _copies_told(session: Session) -> str:
-    """Sentence about how many copies are on the plate, or why they do not fit."""
-    standing, count = session.standing.result, session.bench.copies
+    """Sentence about how many models are on the plate, or why they do not fit."""
+    standing, count = session.standing.result, session.bench.copies + sum(copies for _, copies in session.bench.beside)
     if standing is None or count == 1:
         return ""
     return standing.copies_problem or f"All {count} stand on the plate."

@@ -3,9 +3,9 @@
 import { $, button, disable, duration, hide, listen, made, notice, onData, onKeys, putNew, tabsOf, tell, themeSwitch, toggle, withWholeOptions } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
-import { benchesPanel, devicesPanel } from "./model/benches.js";
+import { benchesPanel, devicesPanel, platePanel } from "./model/benches.js";
 import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
-import { facetsOf, modelFetcher, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
+import { bodiesOf, facetsOf, modelFetcher, modelOf, thumbnailsOf } from "./model/model.js";
 import { ringsOf } from "./model/rings.js";
 import { marksPanel } from "./parts/marks-panel.js";
 import { partsList, partsPanel } from "./parts/parts-panel.js";
@@ -40,12 +40,12 @@ function main() {
   subscribe(onlyWithLine);
   onState(({ note }) => notice(note, "note"));
   slicesPanel(printFrame(camera, picture));
-  const panels = [problemLine, elapsedTimes, historyMenu, previewOf, benchesPanel, devicesPanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
+  const panels = [problemLine, elapsedTimes, historyMenu, previewOf, benchesPanel, devicesPanel, platePanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
   for (const begin of [...panels, printPanel, clicksOf, modelOf, placePanel, thumbnailsOf, apartPanel]) begin(picture);
   if (picture) {
     const ringPlaces = ringsOf(picture);
     subscribe((now, before) => { if (now.dark !== before.dark || !before.state) picture.machine(now.state.machine, now.dark); });
-    for (const drawn of [wallsOf, obstacleOf, handlesOf, facetsOf, pedestalOf]) drawn(picture);
+    for (const drawn of [wallsOf, obstacleOf, handlesOf, facetsOf, bodiesOf]) drawn(picture);
     handle($("canvas"), camera, handsOf(camera, picture));
     sectionView(picture);
     listen("click", { fit: () => picture.fit(ringPlaces()) });

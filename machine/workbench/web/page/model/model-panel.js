@@ -57,13 +57,10 @@ function tellFile({ plates, has_settings: has, settings_note: note }) {
 
 /** A file may be dropped anywhere on the page. */
 function dropping() {
-  const over = (whether) => $("scene").classList.toggle("over", whether);
-  addEventListener("dragover", (event) => { event.preventDefault(); over(true); });
-  addEventListener("dragleave", () => over(false));
-  addEventListener("drop", (event) => {
+  for (const name of ["dragover", "dragleave", "drop"]) addEventListener(name, (event) => {
     event.preventDefault();
-    over(false);
-    takeFiles([...event.dataTransfer.files]);
+    $("scene").classList.toggle("over", name === "dragover");
+    if (name === "drop") takeFiles([...event.dataTransfer.files]);
   });
 }
 
@@ -94,8 +91,9 @@ export function sizePanel() {
 const MIDDLE = [0, 0], STEP_MM = 1, LARGE_STEP_MM = 10; // the latter with Shift held
 const WAYS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
-const placeNow = () => store.placing || store.state.place_mm;
+const stepOf = ({ shiftKey }) => (shiftKey ? LARGE_STEP_MM : STEP_MM);
 const rounded = (place, step) => place.map((x) => step * Math.round(x / step));
+const placeNow = () => store.placing || store.state.place_mm;
 
 /** Has the model stand somewhere else; the picture has it there until that is done or refused. */
 function put(place) {
@@ -121,7 +119,7 @@ export function placePanel(picture) {
   subscribe(() => {
     const now = JSON.stringify(placeNow());
     if (store.state.copies_mm) copies = store.state.copies_mm.map((place) => [...place, 0]); // none are known yet of a model that has just been turned
-    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])));
+    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])), [...placeNow(), 0]);
     if (now === told) return;
     told = now;
     fields.forEach((field, axis) => { field.value = placeNow()[axis]; });
@@ -131,7 +129,7 @@ export function placePanel(picture) {
 
 /** The knob at the model's foot. */
 function handleOf(picture) {
-  const knob = $("hand-place"), hold = (placing) => update({ placing }), stepOf = ({ shiftKey }) => (shiftKey ? LARGE_STEP_MM : STEP_MM);
+  const knob = $("hand-place"), hold = (placing) => update({ placing });
   /** Where a hand is on the plate, from the middle of the model as it stands now; null: it looks above the plate's horizon. */
   const onPlate = (event) => {
     const [eye, along] = picture.sight(event);

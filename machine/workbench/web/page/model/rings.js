@@ -62,8 +62,7 @@ export function ringsOf(picture) {
       const points = ringPoints(RING_AXES[group.dataset.ring], ring), middle = length(sub(eye, ring.centre));
       const seen = points.map((place) => ({ at: picture.placeOf(place), near: length(sub(eye, place)) < middle }));
       group.classList.toggle("turning", Boolean(turning) && turning.axis === group.dataset.ring);
-      const parts = { far: () => true, near: ({ near }) => near, reach: () => true };
-      for (const [name, wanted] of Object.entries(parts)) group.querySelector(`.${name}`).setAttribute("d", pathOf(seen, wanted));
+      for (const name of ["far", "near", "reach"]) group.querySelector(`.${name}`).setAttribute("d", pathOf(seen, ({ near }) => near || name !== "near"));
       const label = seen.reduce((best, spot) => (spot.at && spot.near && (!best || spot.at[1] < best[1]) ? spot.at : best), null) || [-99, -99];
       group.querySelector("text").setAttribute("transform", `translate(${label})`);
     });
@@ -76,10 +75,7 @@ export function ringsOf(picture) {
 
 const onRing = (axis, { centre, radius }, angle) => ringOf(centre, axis, radius, 1, angle)[0];
 
-const ringPoints = (axis, { centre, radius }) => {
-  const points = ringOf(centre, axis, radius, RING_STEPS);
-  return [...points, points[0]];
-};
+const ringPoints = (axis, ring) => [...ringOf(ring.centre, axis, ring.radius, RING_STEPS), onRing(axis, ring, 0)];
 
 /** What a hand that takes a ring holds: the angle at which it has taken it (from), and how many degrees an event has turned it since: the ring's place
  * that is seen nearest to the hand follows it, of those within a quarter turn of the last one, so that it does not jump to the other side. */
@@ -102,13 +98,8 @@ function graspOf(picture, axis, ring, event) {
 
 /** An SVG path along the places that are seen and wanted. */
 function pathOf(seen, wanted) {
-  let text = "", open = false;
-  for (const spot of seen) {
-    const drawn = spot.at && wanted(spot);
-    if (drawn) text += `${open ? "L" : "M"}${spot.at[0].toFixed(1)} ${spot.at[1].toFixed(1)}`;
-    open = drawn;
-  }
-  return text;
+  const drawn = (spot) => spot?.at && wanted(spot);
+  return seen.map((spot, k) => (drawn(spot) ? `${drawn(seen[k - 1]) ? "L" : "M"}${spot.at.map((x) => x.toFixed(1)).join(" ")}` : "")).join("");
 }
 
 /** The sector by which the model is turned just now, and its angle. */

@@ -71,8 +71,8 @@ export function settingsPanel() {
   };
   const fetchNewest = newest({ read: (answer) => answer.json(), take });
   const fetchAll = () => {
-    const { given, part_settings: own, parts, model, rotation, stops, copies } = store.state;
-    fetchNewest(JSON.stringify([part(), [...wrongs.keys()], given, own, parts, model?.name, rotation, stops, copies]), `settings.json?part=${part()}`);
+    const { given, part_settings: own, parts, model, rotation, stops, copies, beside } = store.state;
+    fetchNewest(JSON.stringify([part(), [...wrongs.keys()], given, own, parts, model?.name, rotation, stops, copies, beside]), `settings.json?part=${part()}`);
   };
   const partsToChoose = ({ parts, part_settings: own, model }) => {
     const names = ["all parts", ...Array.from({ length: model ? Math.max(parts, 1) : 0 }, (_, k) => {

@@ -73,7 +73,7 @@ export function stopsPanel() {
     send({ do: "add_stop", kind: $("stop-kind").value, at: $("stop-at").value });
   } });
   onState(({ copies, copies_told: told, problem }, before) => {
-    tell({ "copies-told": told });
+    tell({ "copies-told": told, "plate-told": told });
     fill($("copies"), copies, copies !== before?.copies || (problem && problem !== before?.problem));
   });
   onNew(({ stops }) => stops, (stops) => {
