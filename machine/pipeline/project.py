@@ -86,14 +86,14 @@ def close_projects() -> None:
 
 @dataclass(frozen=True)
 class Project:
-    """A model and everything that decides its print; files lie in the project's folder once it is read.
+    """A model and everything that decides its print; once read, its files are in the project's folder.
 
-    model: None for a demo, which its name finds; own_names: of profiles that are files, by their kind, as a person knows
-    them; rotation: rows of how the model is turned after it is read; plan: None where the model is neither cut nor marked;
-    parts: 0 where nobody has cut it; locked: the parts, counted from the second, whose planes are locked; stops: where the
-    print waits for a person; marks_in_plan: the plan has the boxes that the model's own file marks; figures: of the print,
-    for people and other programs; plate: of the model where that is a slicer file; recommended: how many parts the search would
-    take, 0: there was none; beside: name, model and number of copies of each other model on the plate.
+    model: None for a demo, found by its name; own_names: the user's names of profiles that are files, by kind; rotation: rows of
+    the model's rotation after reading; plan: None if the model is neither cut nor marked; parts: 0 before a decomposition;
+    locked: the parts, counted from the second, whose planes are locked; stops: where the print waits for the user; marks_in_plan:
+    the plan includes the boxes of the model's file; figures: of the print, for users and other programs; plate: of the model in a
+    slicer file; recommended: number of parts that the search prefers, 0: there was no search; beside: name, model and number of
+    copies of each other model on the plate.
     """
 
     name: str

@@ -33,14 +33,14 @@ MOST_KEPT_FACES = 5_000_000  # of the models of all steps, some 25 bytes each: e
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """A model, how it is turned, and how it is cut.
+    """A model, its orientation, and its cuts.
 
-    rotation: rows of what turns the model as it is read. cuts: the base planes of the parts from the second on, in print order;
-    None: nobody has cut it yet. rows: the front that the cuts were chosen from, ever more parts; recommended: how many parts the
-    search would take, 0: no search has been; priced: times and plastic of the rows are for this profile, as far as there are any.
-    locked: those of the cuts that a search begins with and nobody moves. stops: where the print waits for a person, each with its
-    part wherever that goes; copies: how many of the model on the plate; beside: the other models there, each with its number of
-    copies; all three stay until another model is opened. notes: what the search that found the rows says.
+    rotation: rows of the matrix that turns the model as read. cuts: base planes of parts 2, 3, ... in print order; None: not cut
+    yet. rows: the front from which the cuts were chosen, with increasing numbers of parts; recommended: number of parts that the
+    search prefers, 0: no search yet; priced: times and filament of the rows are those for this profile. locked: cuts that a
+    search keeps and that cannot be moved. stops: pauses, each of which follows its part; copies: of the model on the plate;
+    beside: the other models there, each with its number of copies; all three remain until another model is opened. notes: those
+    of the search that found the rows.
     """
 
     profile: Profile

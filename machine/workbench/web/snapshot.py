@@ -221,7 +221,7 @@ def snapshot(session: Session) -> dict[str, Any]:
 
 
 def _savable(session: Session) -> dict[str, tuple[str, str]]:
-    """What can be saved: why it cannot be ("" if it can), and what it is."""
+    """Each kind of file that can be saved: why it cannot be ("" if it can), and its description."""
     model, parts, slices = (lacking(session, need) for need in (Need.MODEL, Need.PARTS, Need.SLICES))
     latest, given = session.slicing.latest(), session.bench.given
     errors, compared = latest is not None and latest.sliced.errors, ", with the comparison" if session.comparing.rows() else ""
