@@ -90,6 +90,31 @@ def test_no_letter_is_small_and_one_button_is_the_next_step(browser: Browser, be
     assert seen == {"model": ["slice"], "parts": ["slice"], "slices": ["slice"], "printing": ["check"], "settings": ["slice"]}
 
 
+def test_settings_are_as_narrow_as_a_window_that_becomes_narrow(browser: Browser, bench: Running) -> None:
+    browser.resize(720, 900)
+    browser.open(bench.address)
+    browser.click("#tab-settings")
+    browser.wait("document.querySelectorAll('[data-key]').length > 10")
+    drawn = "new Promise((drawn) => setTimeout(() => drawn(true), 100))"
+    browser.wait(drawn)
+    browser.click("#tab-model")
+    browser.resize(390, 844)
+    browser.click("#tab-settings")
+    browser.wait(drawn)
+    assert browser.value("$('settings').scrollWidth <= $('settings').clientWidth")
+    browser.resize(*SMALL)
+
+
+def test_a_tool_for_the_whole_model_puts_parts_together_and_ends_when_they_are_apart(browser: Browser, bench: Running) -> None:
+    with_plane(browser, bench)
+    state = "[$('apart').value, $('measure').getAttribute('aria-pressed')]"
+    drag_slider(browser, "apart", 0.3, "input")
+    browser.click("#measure")
+    assert browser.value(state) == ["0", "true"]
+    drag_slider(browser, "apart", 0.3, "input")
+    assert browser.value(state) == ["0.3", "false"]
+
+
 def test_a_part_has_a_card_that_the_keyboard_chooses_and_locks(browser: Browser, bench: Running) -> None:
     with_plane(browser, bench)
     browser.wait("$('parts-list').textContent.includes('breaks at about')")

@@ -68,7 +68,7 @@ def area(browser: Browser) -> float:
     return float(browser.value("$('overhang').textContent").removesuffix(" mm²"))
 
 
-def drag_slider(browser: Browser, slider: str, value: int, event: str) -> None:
+def drag_slider(browser: Browser, slider: str, value: float, event: str) -> None:
     browser.value(f"{{ $('{slider}').value = {value}; $('{slider}').dispatchEvent(new Event('{event}')); }}")
 
 
@@ -276,8 +276,8 @@ def test_a_plane_is_dragged_with_its_figures_and_one_that_cannot_be_cut_goes_bac
     browser.wait("!$('problem').hidden")
     assert "misses the model" in browser.value("$('problem').textContent")
     browser.wait(f"Math.abs(Number($('plane-offset').value) - {moved}) < 0.01 && !$('handles').hidden")
-    browser.click("#dismiss")
-    browser.wait("!$('trouble').checkVisibility()")
+    browser.click("#put-aside")
+    browser.wait("!$('trouble').checkVisibility() && $('put-near').hidden")
     drag_slider(browser, "plane-offset", 39.95, "change")  # 0.05 mm below the top
     browser.wait("$('put-near').checkVisibility()")
     browser.click("#put-near")

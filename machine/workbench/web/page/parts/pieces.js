@@ -92,11 +92,11 @@ export function apartPanel(picture) {
   const fetchPieces = newest({ read: async (answer) => piecesIn(new Uint8Array(await answer.arrayBuffer())), take, begin: () => update({ pieces: null }) });
   $("apart").disabled = !picture;
   listen("input", { apart: () => {
-    update({ apart: numberIn("apart") });
+    update({ apart: numberIn("apart"), clicks: "" }); // which are for the whole model
     picture.fit();
   } });
   subscribe(({ state, tab, pieces, part, apart }, before) => {
-    $("apart-line").hidden = !state.parts || !state.model.drawn;
+    Object.assign($("apart-line"), { hidden: !state.parts || !state.model.drawn }).control.value = apart;
     if (tab === "parts" && !state.search && (state !== before.state || tab !== before.tab)) fetchPieces(keyOf(state), "pieces");
     const seen = apartNow() || (piecesSeen() && state.cuts.some((plane) => plane.limbs_mm)); // a limb's colour is seen on the piece alone
     picture?.pieces(seen ? pieces : null, pieces ? shiftsOf(pieces, apart) : [], part);
