@@ -44,7 +44,7 @@ STEPS = (
     ("plane", ("#parts-list .card:last-child input",), "!document.getElementById('plane').hidden"),
     ("settings", ("#tab-settings",), "document.querySelectorAll('[data-key]').length > 10"),
     ("slicing", ("#tab-slices", "#slice"), "document.getElementById('slice').disabled"),
-    ("look", (), "$('print-page').contentDocument?.documentElement.dataset.picture === 'idle' && !$('print-page').hidden"),
+    ("look", (), "$('print-page').contentDocument?.documentElement?.dataset.picture === 'idle' && !$('print-page').hidden"),
     ("sliced", ("#leave-print",), "$('print-page').hidden && document.documentElement.dataset.walls.split(' ').length === 4"),
     ("checks", ("#tab-printing", "#check"), "!document.getElementById('run-ask').hidden"),
     ("printing", ("#begin",), "document.documentElement.dataset.printing === 'printing'"),
