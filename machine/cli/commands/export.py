@@ -20,7 +20,7 @@ from machine.pipeline.requests import STDOUT, Given, ModelRequest
 from machine.planning.stops import check_stop_parts, parts_in_words
 from machine.view.page import print_page
 from mdp.model_file import DEMO
-from profiles.errors import OutputError
+from profiles.errors import OutputError, reason
 from profiles.profile import DEFAULTS
 from slicer.drawing import layer_svg
 from slicer.paths import SlicedPart
@@ -64,9 +64,17 @@ def export(request: ModelRequest) -> int:
 
 
 def default_gcode(model: str) -> Path:
-    """The G-code file where none is named: here, by the model's name. Raises OutputError if another program wrote it."""
+    """The G-code file where none is named: here, by the model's name. Raises OutputError if another program wrote it, or it
+    cannot be read."""
     path = Path(plain_name(Path(model.removeprefix("demo:")).stem) + ".gcode")
-    if path.is_file() and HEAD not in path.read_bytes()[:100]:
+    if not path.is_file():
+        return path
+    try:
+        with path.open("rb") as file:
+            start = file.read(100)
+    except OSError as error:
+        raise OutputError(f"output {path} exists and cannot be read: {reason(error)}; -o names another file") from None
+    if HEAD not in start:
         raise OutputError(f"output {path} exists and was not written by tiltprint: -o names another file")
     return path
 

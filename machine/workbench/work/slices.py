@@ -152,7 +152,7 @@ def open_gcode(tell: Tell, request: ModelRequest, page: Path, gcode: Path) -> Sl
     return Sliced(
         page,
         gcode,
-        sha256(drawn + content).hexdigest()[:16],  # a file may be tried again, for another machine
+        sha256(drawn + content).hexdigest()[:16],  # the page, too: a file may be opened again for another machine
         values["time_s"],
         values["filament_mm"],
         known_findings(program.lines, profile, program.run.findings),

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from machine.cli.cli import main
-from machine.cli.commands.export import draw_layer, parse_layer
+from machine.cli.commands.export import default_gcode, draw_layer, parse_layer
 from mdp.save import stl
 from profiles.errors import OutputError, SliceError
 from tests.machine.cli.test_cli import FAST
@@ -41,6 +41,19 @@ def test_a_part_or_layer_that_is_not_there_is_named() -> None:
         draw_layer(printed()[2], 3, 1)
     with pytest.raises(SliceError, match=r"part 2 has no layer 4: its layers are 1 to 3"):
         draw_layer(printed()[2], 2, 4)
+
+
+def test_a_file_in_the_way_that_cannot_be_read_is_refused_in_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("box.gcode").write_text("G28\n")
+
+    def refuse(path: Path, mode: str = "r") -> None:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(Path, "open", refuse)
+    monkeypatch.setattr(Path, "read_bytes", refuse)
+    with pytest.raises(OutputError, match=r"^output box.gcode exists and cannot be read: permission denied; -o names"):
+        default_gcode("box.stl")
 
 
 def test_export_without_a_name_writes_the_model_s_here_and_ends_with_a_verdict(
