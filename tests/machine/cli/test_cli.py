@@ -501,3 +501,9 @@ def test_a_package_of_another_program_without_a_first_file_and_a_missing_one_are
     (tmp_path / "profiles" / "__init__.py").write_text('"""tiltprint: ours."""')
     done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
     assert done.stdout == f"{tmp_path / 'mdp'} belongs to another program\n"
+
+
+def test_a_closed_standard_output_is_no_bug() -> None:
+    command = f"{sys.executable} -m machine.cli.cli profiles list >&-"
+    ended = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")
