@@ -13,7 +13,7 @@ class Material(Frozen):
         None, "what a kilogram costs, so that reports tell what a print costs; absent: they do not"
     )
     currency: str = simple("Currency of the price", "filament cost money euro dollar", max_length=12, effect=Effect.NONE)(
-        "", "what the price is counted in, as EUR; stands behind it in reports"
+        "", "currency of the price in reports, such as EUR"
     )
     nozzle_c: float = simple("Nozzle temperature", "hotend extruder printing heat", ge=150, le=450, effect=Effect.NONE)(
         ..., "nozzle temperature, °C"
