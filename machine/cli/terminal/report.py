@@ -133,6 +133,8 @@ def _filament_mm(program: Program) -> float:
 def verdict(run: DryRun) -> str:
     """Whether a program can be printed, with the number of its warnings or errors."""
     warnings = sum(finding.severity == "warning" for finding in run.findings)
+    if not len(run.program.line):
+        return "nothing to print"
     if run.errors:
         return f"not ready to print, {_count(len(run.errors), 'errors')}"
     return "ready to print" + (f", {_count(warnings, 'warnings')}" if warnings else "")

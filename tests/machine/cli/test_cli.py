@@ -324,6 +324,14 @@ def test_a_byte_order_mark_is_read_over(folder: Path) -> None:
     assert main(["simulate", "mark.gcode"]) == 0
 
 
+def test_simulate_ends_with_its_files_and_a_verdict(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("still.gcode").write_text("; a remark\n")
+    assert main(["simulate", "still.gcode", "--json", "still.json"]) == 0
+    assert capsys.readouterr().out.endswith("wrote still.json: nothing to print\n")
+    assert main(["simulate", "short.gcode"]) == 0
+    assert capsys.readouterr().out.endswith("\nready to print, 1 warning\n")
+
+
 def test_a_model_that_does_better_lying_down_is_laid_down(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     turned, told = [], []
