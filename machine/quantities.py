@@ -32,6 +32,11 @@ def newtons(force_n: float) -> str:
     return f"{float(f'{force_n:.2g}'):.12g}"
 
 
+def amount(value: float) -> str:
+    """Format with two decimals, or with fewer if three digits need fewer: 9.45, 20.7, 125."""
+    return f"{value:.{2 if value < 9.995 else 1 if value < 99.95 else 0}f}"
+
+
 def percent(share: float | None, digits: int = 0) -> str:
     """Format a share as percent without the sign; a dash if None."""
     return "-" if share is None else f"{100.0 * share:.{digits}f}"
@@ -52,11 +57,11 @@ def price(filament_mm: float, material: Material) -> float | None:
 
 def price_in_words(filament_mm: float, material: Material) -> str:
     """Price of a length of filament with its currency, such as 0.42 EUR; "" if the material has no price."""
-    amount = price(filament_mm, material)
-    return "" if amount is None else f"{amount:.2f} {material.currency}".rstrip()
+    costs = price(filament_mm, material)
+    return "" if costs is None else f"{costs:.2f} {material.currency}".rstrip()
 
 
 def price_json(filament_mm: float, material: Material) -> dict[str, float | str]:
     """`cost` and `currency` for a JSON report; {} if the material has no price."""
-    amount = price(filament_mm, material)
-    return {} if amount is None else {"cost": amount, "currency": material.currency}
+    costs = price(filament_mm, material)
+    return {} if costs is None else {"cost": costs, "currency": material.currency}

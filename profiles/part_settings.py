@@ -107,7 +107,8 @@ def parse_part_settings(text: str) -> PartSettings:
     known = colon and number.strip().isascii() and number.strip().isdigit() and 1 <= int(number.strip()[:9]) <= MOST_PARTS
     if not known or not all(key.strip() and equals and value.strip() for key, equals, value in pairs):
         raise ProfileError(
-            f"{option('part', text)}: PART:KEY=VALUE,... is expected, as 2:walls=4,infill_density=0.4; PART is 1 to {MOST_PARTS}"
+            f"{option('part', text)}: PART:KEY=VALUE,... is expected, such as 2:walls=4,infill_density=40%; "
+            f"PART is 1 to {MOST_PARTS}"
         )
     values = {key.strip().removeprefix("process."): read_value(value.strip()) for key, _, value in pairs}
     return PartSettings(part=int(number), process=values)

@@ -28,7 +28,7 @@ def export(
     asked: requests.ExportOptions,
     given: options.ProfileOptions,
     out: Annotated[
-        Path | None, option("-o --out OUT.gcode", "G-code file to write, - for standard output; else MODEL.gcode, here")
+        Path | None, option("-o --out OUT.gcode", "file to write, - for standard output; default: MODEL.gcode in this folder")
     ] = None,
 ) -> int:
     """Write the G-code of one or several models. A dry run checks it first."""

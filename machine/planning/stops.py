@@ -43,7 +43,7 @@ def parse_stops(pauses: Sequence[str], changes: Sequence[str]) -> tuple[Stop, ..
         match = WRITTEN.fullmatch(text.strip())
         if match is None or 0 in (int(match[1]), int(match[2] or 1)):
             written = advice("filament-change" if change else "pause", text)
-            raise SliceError(f"{written}: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, as 2:15 or 1:8.4mm")
+            raise SliceError(f"{written}: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, such as 2:15 or 1:8.4mm")
         part, layer, height = match.groups()
         stops.append(Stop(int(part), int(layer) if layer else None, float(height) if height else None, change))
     return tuple(stops)

@@ -86,7 +86,7 @@ def _part(table: dict[str, Any], number: int) -> PlannedPart:
 
 def _points(value: Any, key: str) -> tuple[Vector, ...]:
     if not isinstance(value, list) or not 1 <= len(value) <= MOST_JOINED:
-        raise PlanError(f"{key} is {_show(value)}: a list of 1 to {MOST_JOINED} points is expected, as [[0, 12, 48]]")
+        raise PlanError(f"{key} is {_show(value)}: a list of 1 to {MOST_JOINED} points is expected, such as [[0, 12, 48]]")
     return tuple(_vector(point, key) for point in value)
 
 
@@ -138,7 +138,7 @@ def _box(values: dict[str, Any], where: str) -> Zone:
     if room is None:
         return Zone(low, high, axes)
     if not isinstance(room, dict):
-        expected = "a box is expected, as {min_mm = [0, 0, 0], max_mm = [9, 9, 9]}"
+        expected = "a box is expected, such as {min_mm = [0, 0, 0], max_mm = [9, 9, 9]}"
         raise PlanError(f"{where}room is {_show(room)}: {expected}")
     _only(room, BOX_KEYS, f"{where}room ")
     return Zone(low, high, axes, _box(room, f"{where}room "))

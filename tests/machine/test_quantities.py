@@ -3,7 +3,7 @@
 import pytest
 
 from machine.gcode.settings import foot
-from machine.quantities import price, price_in_words, price_json
+from machine.quantities import amount, price, price_in_words, price_json
 from profiles.profile import load
 
 PRICED = load(settings=["material.price_per_kg=25", "material.currency=EUR", "material.density_g_cm3=1.25"])
@@ -14,6 +14,17 @@ def test_filament_costs_what_a_kilogram_costs_by_its_weight() -> None:
     assert price(TEN_GRAMS_MM, PRICED.material) == pytest.approx(0.25)
     assert price_in_words(TEN_GRAMS_MM, PRICED.material) == "0.25 EUR"
     assert price_json(TEN_GRAMS_MM, PRICED.material) == {"cost": pytest.approx(0.25), "currency": "EUR"}
+
+
+def test_an_amount_has_at_most_three_digits() -> None:
+    assert [amount(value) for value in (0.0, 9.447, 9.996, 20.66, 99.96, 1234.5)] == [
+        "0.00",
+        "9.45",
+        "10.0",
+        "20.7",
+        "100",
+        "1234",
+    ]
 
 
 def test_without_a_price_nothing_is_told_of_it_not_even_in_the_file() -> None:

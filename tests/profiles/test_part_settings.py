@@ -26,7 +26,7 @@ def test_what_is_given_later_stands_over_a_plan_s_settings() -> None:
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [
-        ("walls=4", "--part walls=4: PART:KEY=VALUE,... is expected, as 2:walls=4,infill_density=0.4"),
+        ("walls=4", "--part walls=4: PART:KEY=VALUE,... is expected, such as 2:walls=4,infill_density=40%"),
         ("0:walls=4", "PART is 1 to 1000"),
         ("2:walls", "--part 2:walls: PART:KEY=VALUE,... is expected"),
         ("2:", "--part 2:: PART:KEY=VALUE,... is expected"),

@@ -1,5 +1,6 @@
 """The decompose command: a model's parts as files, pictures and tables, with advice on the best way to print it."""
 
+import shlex
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -66,10 +67,10 @@ def decompose(request: ModelRequest) -> int:
 def _verdict(request: ModelRequest, decomposition: Decomposition) -> str:
     """The area that needs support in the parts, and the command that exports them."""
     plan = request.outputs.plan or request.plan or (request.outputs.folder and request.outputs.folder / PLAN)
-    by_plan = f" --plan {plan}" if plan else ""
+    command = shlex.join(["tiltprint", "export", request.model, *(["--plan", str(plan)] if plan else [])])
     return (
         f"{in_parts(len(decomposition.parts))}, {decomposition.residual_area_mm2:.0f} mm² need support; "
-        f"tiltprint export {request.model}{by_plan} makes the G-code"
+        f"{command} makes the G-code"
     )
 
 

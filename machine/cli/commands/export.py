@@ -1,6 +1,7 @@
 """The export command, which writes G-code and a picture of a layer, and the save command, which writes a project as 3MF."""
 
 import re
+import shlex
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
@@ -115,7 +116,8 @@ def save(request: ModelRequest, out: Path) -> int:
     picture = png_bytes(parts_together(decomposition, decomposed.profile, PICTURE_PX))
     write_bytes(out, project_bytes(_project(request, decomposed), decomposed.plan, decomposition.mesh, picture))
     count = len(decomposed.plan.parts) + 1
-    contents = f"{request.name} {in_parts(count)}, with its plan and profiles; tiltprint export {out} makes its G-code"
+    command = shlex.join(["tiltprint", "export", str(out)])
+    contents = f"{request.name} {in_parts(count)}, with its plan and profiles; {command} makes its G-code"
     show(written_line((out,), contents))
     return 0
 

@@ -6,7 +6,7 @@ Modules that only some options need are imported when such an option is given.
 from dataclasses import asdict, replace
 from pathlib import Path
 
-from machine.cli.terminal.report import agreement_line, print_price, print_table
+from machine.cli.terminal.report import agreement_line, print_price, print_table, verdict, written_line
 from machine.dryrun.dryrun import summary
 from machine.firmware.firmware import check_baud
 from machine.notices import show
@@ -67,5 +67,6 @@ def simulate(request: ModelRequest, reference: str | None = None, baud: int | No
             summary(program.run) | print_price(program, profile) | ({} if agreed is None else {"model": asdict(agreed)}),
         )
     if outputs.json != STDOUT:
-        show(print_table(program, profile) + ("" if agreed is None else agreement_line(agreed)))
+        ending = written_line((outputs.html, outputs.json), verdict(program.run))
+        show(print_table(program, profile) + ("" if agreed is None else agreement_line(agreed)) + ending)
     return 1 if program.run.errors else 0

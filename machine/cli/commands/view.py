@@ -31,7 +31,7 @@ def view(request: ModelRequest, open_browser: bool = False) -> int:
     alternatives = compare_with_one_part(program, profile) if request.compare else ()
     content = print_page(request.name, program, profile, known=known, alternatives=alternatives)
     write_bytes(path, content)
-    show(plain_line(f"{path}: {len(content) / 1e6:.1f} MB, {_in_words(program, known)}") + "\n")
+    show(plain_line(f"wrote {path}: {len(content) / 1e6:.1f} MB, {_in_words(program, known)}") + "\n")
     if open_browser and not webbrowser.open(path.resolve().as_uri()):
         say(f"no browser could be started: open {path} in one")
     return 0

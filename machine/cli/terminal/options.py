@@ -91,7 +91,7 @@ def _names_of(kind: str) -> Callable[[str], list[str]]:
 OF_FILE = "; default: that of the project or G-code file, else {}"
 
 
-def _profile_option(kind: str, otherwise: str = "") -> Any:
+def profile_option(kind: str, otherwise: str = "") -> Any:
     words = f"{kind} profile{otherwise.format(getattr(Given, kind))}"
     return typer.Option(f"--{kind}", metavar="NAME|FILE", autocompletion=_names_of(kind), help=words)
 
@@ -113,10 +113,10 @@ ModelsOrGcode = Annotated[
         metavar="MODEL|FILE.gcode", show_default=False, help="model files or demo:NAME, as for export, or a G-code file"
     ),
 ]
-MachineName = Annotated[str, _profile_option("machine")]
-MachineGiven = Annotated[str | None, _profile_option("machine", OF_FILE)]
+MachineName = Annotated[str, profile_option("machine")]
+MachineGiven = Annotated[str | None, profile_option("machine", OF_FILE)]
 Settings = Annotated[
-    tuple[str, ...], option("--set KEY=VALUE", "override a profile key, as process.infill_density=20%; repeatable")
+    tuple[str, ...], option("--set KEY=VALUE", "override a profile key, such as process.infill_density=20%; repeatable")
 ]
 JsonFile = Annotated[Path | None, option("--json FILE", "write the result as JSON; - for standard output")]
 HtmlFile = Annotated[Path | None, option("--html FILE", "page to write for a browser, see view")]
@@ -186,7 +186,7 @@ class ProgramOptions(FileOptions):
         tuple[str, ...],
         option("--filament-change PART:LAYER", "change the filament before this layer, or at a height; repeatable"),
     ] = ()
-    copies: Annotated[int | None, option("--copies N", "copies of each model on the plate; 1 by default")] = None
+    copies: Annotated[int | None, option("--copies N", "copies of each model on the plate; default: 1")] = None
 
 
 @dataclass(frozen=True)
@@ -194,8 +194,8 @@ class ProfileOptions:
     """The profiles by name, and settings over them; None means that of the project or G-code file, else the default."""
 
     machine: MachineGiven = None
-    material: Annotated[str | None, _profile_option("material", OF_FILE)] = None
-    process: Annotated[str | None, _profile_option("process", OF_FILE)] = None
+    material: Annotated[str | None, profile_option("material", OF_FILE)] = None
+    process: Annotated[str | None, profile_option("process", OF_FILE)] = None
     settings: Settings = ()
 
     @property
@@ -235,8 +235,8 @@ class DefaultProfileOptions(ProfileOptions):
     """Profile options of a command that reads neither a model nor G-code."""
 
     machine: MachineName = Given.machine
-    material: Annotated[str, _profile_option("material")] = Given.material
-    process: Annotated[str, _profile_option("process")] = Given.process
+    material: Annotated[str, profile_option("material")] = Given.material
+    process: Annotated[str, profile_option("process")] = Given.process
 
     @property
     def names(self) -> tuple[str, str, str]:

@@ -10,7 +10,7 @@ import numpy as np
 from machine.dryrun.dryrun import DryRun, summary
 from machine.pipeline.requests import STDOUT
 from machine.program import Alternative, Program
-from machine.quantities import duration, filament_g, minutes, newtons, percent, price_in_words, price_json
+from machine.quantities import amount, duration, filament_g, minutes, newtons, percent, price_in_words, price_json
 from profiles.messages import terminal_words
 from profiles.profile import Profile
 from slicer.paths import SlicedPart
@@ -133,6 +133,8 @@ def _filament_mm(program: Program) -> float:
 def verdict(run: DryRun) -> str:
     """Whether a program can be printed, with the number of its warnings or errors."""
     warnings = sum(finding.severity == "warning" for finding in run.findings)
+    if not len(run.program.line):
+        return "nothing to print"
     if run.errors:
         return f"not ready to print, {_count(len(run.errors), 'errors')}"
     return "ready to print" + (f", {_count(warnings, 'warnings')}" if warnings else "")
@@ -148,10 +150,10 @@ def run_table(run: DryRun) -> str:
     """Table of the dry run's figures and findings."""
     values = summary(run)
     lines = [
-        f"time {duration(values['time_s'])}, filament {values['filament_mm'] / 1000:.2f} m, "
-        f"{values['extruded_mm3'] / 1000:.2f} cm³",
+        f"time {duration(values['time_s'])}, filament {amount(values['filament_mm'] / 1000)} m, "
+        f"{amount(values['extruded_mm3'] / 1000)} cm³",
         ", ".join(_count(values[key], key) for key in ("parts", "layers", "reorientations", "retractions"))
-        + f", {values['travel_mm'] / 1000:.2f} m travel",
+        + f", {amount(values['travel_mm'] / 1000)} m travel",
     ]
     if values["bounds_mm"]:
         low, high = (", ".join(f"{value:.1f}" for value in corner) for corner in values["bounds_mm"])
@@ -224,5 +226,5 @@ def _costs(alternative: Alternative) -> list[str]:
         return ["-"] * 5
     filament_m, support_cm3 = (alternative.filament_mm or 0.0) / 1000, (alternative.support_mm3 or 0.0) / 1000
     mass = f"{alternative.filament_g or 0.0:.1f} g"
-    volumes = [f"{support_cm3:.2f} cm³", f"{sum(alternative.interface_mm3.values()) / 1000:.2f} cm³"]
-    return [duration(alternative.time_s), f"{filament_m:.2f} m", mass, *volumes]
+    volumes = [f"{amount(support_cm3)} cm³", f"{amount(sum(alternative.interface_mm3.values()) / 1000)} cm³"]
+    return [duration(alternative.time_s), f"{amount(filament_m)} m", mass, *volumes]

@@ -153,7 +153,7 @@ class ResumeOptions:
         None
     )
     log: options.LogFile = None
-    machine: options.MachineGiven = None
+    machine: Annotated[str | None, options.profile_option("machine", "; default: that of the journal")] = None
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ def factors(profile: Profile, given: Sequence[str] = ()) -> tuple[Factor, ...]:
         key, equals, value = text.partition("=")
         key = key.strip().removeprefix("process.")
         if not equals or not value.strip():
-            raise ProfileError(f"{option('vary', text)}: KEY=VALUE is expected, as interface_flow=1.15")
+            raise ProfileError(f"{option('vary', text)}: KEY=VALUE is expected, such as interface_flow=1.15")
         if key not in part_keys():
             raise ProfileError(
                 f"{option('vary', text)}: {key} cannot differ from bar to bar; interlock and `interface_` keys can"

@@ -324,6 +324,14 @@ def test_a_byte_order_mark_is_read_over(folder: Path) -> None:
     assert main(["simulate", "mark.gcode"]) == 0
 
 
+def test_simulate_ends_with_its_files_and_a_verdict(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("still.gcode").write_text("; a remark\n")
+    assert main(["simulate", "still.gcode", "--json", "still.json"]) == 0
+    assert capsys.readouterr().out.endswith("wrote still.json: nothing to print\n")
+    assert main(["simulate", "short.gcode"]) == 0
+    assert capsys.readouterr().out.endswith("\nready to print, 1 warning\n")
+
+
 def test_a_model_that_does_better_lying_down_is_laid_down(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     turned, told = [], []
@@ -501,3 +509,9 @@ def test_a_package_of_another_program_without_a_first_file_and_a_missing_one_are
     (tmp_path / "profiles" / "__init__.py").write_text('"""tiltprint: ours."""')
     done = subprocess.run([sys.executable, "-c", look], capture_output=True, text=True, check=True)
     assert done.stdout == f"{tmp_path / 'mdp'} belongs to another program\n"
+
+
+def test_a_closed_standard_output_is_no_bug() -> None:
+    command = f"{sys.executable} -m machine.cli.cli profiles list >&-"
+    ended = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
+    assert (ended.returncode, ended.stderr) == (0, "")

@@ -55,7 +55,7 @@ def test_a_pause_is_not_the_end_of_its_part() -> None:
 @pytest.mark.parametrize(
     ("pause", "sentence"),
     [
-        ("twelve", "--pause twelve: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, as 2:15 or 1:8.4mm"),
+        ("twelve", "--pause twelve: PART:LAYER or PART:HEIGHTmm is expected, counted from 1, such as 2:15 or 1:8.4mm"),
         ("3:1", "--pause 3:1: there is no part 3, the parts are 1 to 2"),
         ("2:4", "--pause 2:4: part 2 has no layer 4, its layers are 1 to 3"),
         ("1:9mm", "--pause 1:9mm: part 1 is only 0.6 mm high"),

@@ -122,7 +122,7 @@ def test_view_names_the_page_after_the_file(folder: Path, capsys: pytest.Capture
     Path("moves.gcode").write_text(MOVES)
     assert main(["view", "moves.gcode"]) == 0
     output = capsys.readouterr().out
-    assert output.startswith("moves.html: 0.2 MB, 3 moves")
+    assert output.startswith("wrote moves.html: 0.2 MB, 3 moves")
     header, arrays = opened(Path("moves.html").read_bytes())
     assert (header["source"], header["machine"]["known"]) == ("foreign", False)
     assert arrays["end"][-1].tolist() == [10.0, 10.0, 0.2, 0.0, 0.0]

@@ -92,7 +92,7 @@ REFUSED = [
     ("version = 1\norientation = 7", "orientation is 7: 3 numbers in brackets are expected"),
     (
         "version = 1\n[[keep]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, 1, 1]\nroom = 5",
-        "keep 1: room is 5: a box is expected, as {min_mm =",
+        "keep 1: room is 5: a box is expected, such as {min_mm =",
     ),
     (
         "version = 1\n[[keep]]\nmin_mm = [0, 0, 0]\nmax_mm = [1, 1, 1]\nroom = {min_mm = [0, 0, 0], max_mm = [0, 1, 1]}",

@@ -40,16 +40,16 @@ def _values(path: str) -> Any:
 
 def test_the_plan_in_the_folder_gives_the_same_parts_and_stays_as_it_is(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
-    _run("decompose", "tee.stl", "-o", "a")
-    edited = "# my own remark\n" + Path("a/plan.toml").read_text()
-    Path("a/plan.toml").write_text(edited)
-    _run("decompose", "tee.stl", "--plan", "a/plan.toml", "-o", "b")
-    assert "tiltprint export tee.stl --plan a/plan.toml makes the G-code" in capsys.readouterr().out
-    assert [Path(f"a/{name}").read_bytes() for name in PARTS] == [Path(f"b/{name}").read_bytes() for name in PARTS]
+    _run("decompose", "tee.stl", "-o", "a 1")
+    edited = "# my own remark\n" + Path("a 1/plan.toml").read_text()
+    Path("a 1/plan.toml").write_text(edited)
+    _run("decompose", "tee.stl", "--plan", "a 1/plan.toml", "-o", "b")
+    assert "tiltprint export tee.stl --plan 'a 1/plan.toml' makes the G-code" in capsys.readouterr().out
+    assert [Path(f"a 1/{name}").read_bytes() for name in PARTS] == [Path(f"b/{name}").read_bytes() for name in PARTS]
     assert json.loads(Path("b/decomposition.json").read_text())["candidates_evaluated"] == 0
     again = Path("b/plan.toml").read_text()
-    _run("decompose", "tee.stl", "--plan", "a/plan.toml", "-o", "a")
-    assert Path("a/plan.toml").read_text() == edited
+    _run("decompose", "tee.stl", "--plan", "a 1/plan.toml", "-o", "a 1")
+    assert Path("a 1/plan.toml").read_text() == edited
     assert again.split("[[front]]")[0] in edited
 
 
