@@ -17,19 +17,17 @@ def _reversed(limits: Limits, name: str) -> list[str]:
 class LinearAxis(Frozen):
     """One of the axes X, Y, Z, in the firmware's coordinates."""
 
-    limits_mm: Limits = advanced("Travel", "limits build volume size stroke")(
-        ..., "least and greatest position the firmware accepts, mm"
-    )
+    limits_mm: Limits = advanced("Travel", "limits build volume size stroke")(..., "range that the firmware accepts, mm")
     speed_mm_s: float = advanced("Greatest speed", "maximum feedrate", gt=0, le=5000, effect=Effect.PRICES)(
         ..., "greatest speed, mm/s"
     )
     acceleration_mm_s2: float = advanced("Greatest acceleration", "maximum", gt=0, le=100000, effect=Effect.PRICES)(
-        ..., "acceleration, mm/s2"
+        ..., "acceleration, mm/s²"
     )
     home_mm: float | None = rare("Position at home", "endstop")(
         None,
-        "what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, mm; left out: "
-        "the least of limits_mm for X and Y, the greatest for Z",
+        "position after homing; Marlin assumes it after a restart, mm; left out: the least of limits_mm for X and Y, the "
+        "greatest for Z",
     )
 
     def _problems(self) -> Iterable[str]:
@@ -43,36 +41,36 @@ class RotaryAxis(Frozen):
     rule of LinuxCNC's xyzac-trt-kins, whose default sign is -1.
     """
 
-    letter: Letter = advanced("Letter in G-code", "axis A B C")(..., "the G-code word of this axis")
+    letter: Letter = advanced("Letter in G-code", "axis A B C")(..., "G-code letter")
     stepper: str = rare("Stepper in Klipper", "manual_stepper", pattern=r"^[A-Za-z0-9_]*$")(
-        "", "name of the axis's [manual_stepper] in Klipper; empty: stepper_ and the letter"
+        "", "its [manual_stepper] in Klipper; empty: stepper_ and the letter"
     )
-    axis: Vector = advanced("Direction of the axis")(..., "direction of the axis in the machine frame (any length)")
+    axis: Vector = advanced("Direction of the axis")(..., "direction in the machine frame (any length)")
     point_mm: Vector = advanced("Point on the axis", "centre of rotation calibration offset")(
         ...,
-        "a point of the axis in the machine frame at tilt 0, turn 0; for the turn axis the point where it meets the table's "
+        "point on the axis in the machine frame at tilt 0, turn 0; for the turn axis the point where it meets the table's "
         "surface, which is the workpiece origin",
     )
     sign: Literal[-1, 1] = advanced("Sense of turning", "direction invert")(
         ..., "-1: positive values turn the table right-handed about axis; 1: the other way"
     )
     zero_deg: float = advanced("Value when level", "offset zero", ge=-360, le=360)(
-        0.0, "axis value at which the table is level (tilt) or unturned"
+        0.0, "value at which the table is level (tilt) or unturned"
     )
-    limits_deg: Limits = advanced("Range", "limits angle")(..., "least and greatest value the firmware accepts, deg")
+    limits_deg: Limits = advanced("Range", "limits angle")(..., "range that the firmware accepts, deg")
     budget_deg: float | None = advanced("Winding of the cables", "limit", ge=180, le=100000)(
-        None, "how far cables let the axis wind to either side of zero_deg, deg: it is unwound before; left out: no cable"
+        None, "winding that cables allow on each side of zero_deg, deg: the axis is unwound in time; left out: no cable"
     )
     speed_deg_s: float = advanced("Greatest speed", "maximum feedrate", gt=0, le=3600, effect=Effect.PRICES)(
         ..., "greatest speed, deg/s"
     )
     acceleration_deg_s2: float = advanced("Greatest acceleration", "maximum", gt=0, le=100000, effect=Effect.PRICES)(
-        ..., "acceleration, deg/s2"
+        ..., "acceleration, deg/s²"
     )
     home_deg: float | None = rare("Position at home", "endstop")(
         None,
-        "what the firmware calls the place where the axis is homed; Marlin believes itself there after a restart, deg; left out: "
-        "it is homed to zero_deg, and believed at the least of limits_deg after a restart",
+        "position after homing; Marlin assumes it after a restart, deg; left out: it is homed to zero_deg, and assumed at the "
+        "least of limits_deg after a restart",
     )
 
     @property

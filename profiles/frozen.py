@@ -7,7 +7,16 @@ from functools import partial
 from types import NoneType
 from typing import Any, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    ValidationError,
+    ValidationInfo,
+    ValidatorFunctionWrapHandler,
+    field_validator,
+    model_validator,
+)
 from pydantic_core import PydanticCustomError
 
 Vector = tuple[float, float, float]
@@ -101,12 +110,16 @@ class Frozen(BaseModel):
         """Treat an empty text as no value for an optional key, also if an inherited profile has a value."""
         return None if value == "" and may_be_left_out(cls.model_fields[str(info.field_name)].annotation) else value
 
-    @field_validator("*", mode="before")
+    @field_validator("*", mode="wrap")
     @classmethod
-    def _percentage(cls, value: Any, info: ValidationInfo) -> Any:
-        """Read a percentage, as "20%", for a key whose value is a share."""
-        written = PERCENT.fullmatch(value) if isinstance(value, str) and unit_of(str(info.field_name)) == "%" else None
-        return float(f"{written[1]}e-2") if written else value
+    def _percentage(cls, value: Any, validate: ValidatorFunctionWrapHandler, info: ValidationInfo) -> Any:
+        """Read a percentage, such as "20%", for a key whose value is a share. An error holds it as it was written."""
+        if not isinstance(value, str) or unit_of(str(info.field_name)) != "%" or (share := share_of(value)) is None:
+            return validate(value)
+        try:
+            return validate(share)
+        except ValidationError as error:
+            raise PydanticCustomError("percentage", "{problem}", {"problem": str(error)}) from None
 
     @field_validator("*", mode="before")
     @classmethod
@@ -132,6 +145,16 @@ class Frozen(BaseModel):
 def may_be_left_out(annotation: Any) -> bool:
     """Whether a key of this type may have no value."""
     return NoneType in get_args(annotation)
+
+
+def share_of(text: str) -> float | None:
+    """The share that a percentage means; None for other texts.
+
+    >>> share_of("20%"), share_of("102.5 %"), share_of("0.2")
+    (0.2, 1.025, None)
+    """
+    written = PERCENT.fullmatch(text)
+    return float(f"{written[1]}e-2") if written else None
 
 
 def unit_of(key: str) -> str:

@@ -75,7 +75,7 @@ class Head(Frozen):
     nozzle_mm: float = simple("Nozzle diameter", "size", gt=0.05, le=3)(..., "diameter of the nozzle's bore, mm")
     silhouette_mm: list[tuple[float, float]] = advanced(
         "Silhouette of the hot end", "extruder clearance radius collision", min_length=1
-    )(..., "pairs [radius, height above the tip] of the hot end's lowest points, radii rising")
+    )(..., "[radius, height above the tip] of the hot end's lowest points")
     boxes: list[Box] = advanced("Bodies beside the nozzle", "extruder clearance fan duct collision")(
         [], "fan duct, carriage, gantry beam"
     )
@@ -98,7 +98,7 @@ class Table(Frozen):
         ..., "radius of a round plate, mm; size_mm makes it half a diagonal"
     )
     size_mm: tuple[float, float] | None = simple("Size of a rectangle", "bed size build plate shape")(
-        None, "x and y size of a rectangular plate at turn 0, its middle on the turn axis, mm; left out: round"
+        None, "x and y of a rectangular plate, mm; its middle is on the turn axis, at turn 0; left out: round"
     )
     thickness_mm: float = rare("Thickness", "build plate", gt=0, le=200)(..., "thickness of the plate, mm")
 
@@ -135,28 +135,28 @@ class Blocks(Frozen):
     )
     resume: Block = rare("G-code after a power cut", "custom script recovery", effect=Effect.NONE)(
         "",
-        "after a power cut, a print on the table: makes the axes know where they stand, and leaves the tip at {clear_z_mm} or "
-        "above, the table at {tilt_deg} {turn_deg}; {x_mm} {y_mm} {z_mm} is where the tip was. Empty: all are taken to stand "
-        "there still, the tip rises, X and Y are homed",
+        "after a power cut: gives the axes their positions without touching the print, and leaves the tip at {clear_z_mm} or "
+        "above, the table at {tilt_deg} {turn_deg}; {x_mm} {y_mm} {z_mm} is where the tip was. Empty: all axes are assumed to "
+        "be there still, the tip rises, X and Y are homed",
     )
 
 
 class Machine(Frozen):
     """A printer whose head moves on X Y Z over a table that tilts about one axis and turns about another, or stands still."""
 
-    name: str = advanced("Name of the machine", "printer", effect=Effect.NONE)(..., "what people call it")
+    name: str = advanced("Name of the machine", "printer", effect=Effect.NONE)(..., "its name")
     shape: Literal["table", "fixed"] = advanced("Shape", "kinematics 3-axis 5-axis")(
         "table", "table: it tilts and turns; fixed: three axes only, tilt and turn are left out, all is printed in one part"
     )
     dialect: DialectName = advanced("Firmware", "G-code flavor marlin klipper")(
         ...,
-        "the firmware's way of writing G-code; klipper: the rotary steppers are axes of G1 (GCODE_AXIS), klipper_steppers: they "
-        "are turned by MANUAL_STEPPER",
+        "G-code dialect of the firmware; klipper: the rotary steppers are axes of G1 (GCODE_AXIS), klipper_steppers: they are "
+        "turned by MANUAL_STEPPER",
     )
     coordinates: Literal["table", "workpiece"] = advanced("Meaning of X Y Z", "tool centre point TCP")(
         "table",
-        "what X Y Z of the file mean; table: axis positions, which any firmware with five plain axes prints; workpiece: places "
-        "on the table, for a firmware that follows the table by itself (marlin with G43.4, linuxcnc, grblhal)",
+        "meaning of X Y Z in the file; table: axis positions, which any firmware with five plain axes prints; workpiece: "
+        "places on the table, for a firmware that follows the table by itself (marlin with G43.4, linuxcnc, grblhal)",
     )
     x: LinearAxis
     y: LinearAxis
@@ -164,13 +164,13 @@ class Machine(Frozen):
     tilt: RotaryAxis
     turn: RotaryAxis
     tool_mm: Vector = advanced("From the tip to X Y Z", "tool offset length")(
-        (0.0, 0.0, 0.0), "from the nozzle tip to the point whose position X Y Z tell, mm"
+        (0.0, 0.0, 0.0), "from the nozzle tip to the point at X Y Z, mm"
     )
     junction_speed_mm_s: float = advanced(
         "Corner speed", "jerk junction deviation square corner velocity", ge=0, le=100, effect=Effect.PRICES
-    )(8.0, "speed change that the firmware makes at once at a corner (jerk), mm/s")
+    )(8.0, "instant speed change at a corner (jerk), mm/s")
     receive_bytes: int = rare("Receive buffer", "RX_BUFFER_SIZE serial", ge=64, le=65536, effect=Effect.NONE)(
-        128, "receive buffer of the board's serial port, bytes (Marlin: RX_BUFFER_SIZE): less is on its way at a time"
+        128, "receive buffer of the serial port, bytes (Marlin: RX_BUFFER_SIZE): less is on its way at a time"
     )
     extruder_speed_mm_s: float = advanced("Extruder speed", "E maximum feedrate", gt=0, le=500, effect=Effect.PRICES)(
         60.0, "greatest speed of the filament, mm/s"
@@ -179,51 +179,47 @@ class Machine(Frozen):
         1500.0, "acceleration of the filament, mm/s²"
     )
     arcs: bool = advanced("Arcs", "arc fitting G2 G3 welder", effect=Effect.NONE)(
-        False, "true: strokes along circles are written as arcs, G2 and G3; the firmware must know them"
+        False, "true: circular strokes are written as G2, G3; the firmware must know them"
     )
     arc_tolerance_mm: float = advanced("Arc tolerance", "arc fitting resolution", ge=0.003, le=0.5, effect=Effect.NONE)(
-        0.025, "an arc stays so near to the path it replaces, mm; 0.025 is an eighteenth of a bead"
+        0.025, "greatest deviation of an arc, mm; 0.025 is an eighteenth of a bead"
     )
     table: Table
-    cradle: list[CradleBox] = rare("Bodies that tilt with the table", "collision")(
-        [], "what tilts with the table but does not turn with it"
-    )
+    cradle: list[CradleBox] = rare("Bodies that tilt with the table", "collision")([], "bodies that tilt but do not turn")
     head: Head
     clearance_mm: float = advanced("Clearance between head and table", "collision distance", ge=0, le=100)(
-        1.0, "least distance kept between head and table, mm"
+        1.0, "least distance between head and table, mm"
     )
     lift_mm: float = advanced("Lift while the table moves", "z hop", ge=0, le=500, effect=Effect.NONE)(
-        10.0, "extra height above everything printed while the table moves, mm"
+        10.0, "height above the print while the table moves, mm"
     )
     pause_cools_after_min: float = advanced("Nozzle off after a pause of, minutes", "idle timeout", ge=0, le=1440)(
         10.0,
-        "minutes of a pause after which the nozzle is switched off, the bed not; it is heated and filled again when the print "
-        "goes on; as long as Prusa's M600 (M600_TIMEOUT 600 s) and Klipper (idle_timeout) wait, Marlin's M600 waits 45 s "
+        "minutes of pause before the nozzle is switched off; the bed stays on; the nozzle is heated and primed when the print "
+        "continues; as long as Prusa's M600 (M600_TIMEOUT 600 s) and Klipper (idle_timeout) wait, Marlin's M600 waits 45 s "
         "(PAUSE_PARK_NOZZLE_TIMEOUT); 0: never",
     )
     purge_mm: float = simple("Purge line", "prime line intro wipe", ge=0, le=500, effect=Effect.PRICES)(
         0.0,
-        "length of the line that is printed at the plate's edge, clear of the print, after the start block, so that the nozzle "
-        "is full and clean, mm; 0: none, or the start block has one itself",
+        "length of a purge line at the plate's edge, mm; it follows the start block, clear of the print; 0: none, or the "
+        "start block has its own",
     )
     nozzle_limit_c: float = advanced("Hottest nozzle", "maximum temperature", gt=0, le=600, effect=Effect.NONE)(
         300.0, "greatest nozzle temperature, °C"
     )
     nozzle_heating_c_s: float = rare("Heating of the nozzle", "heat-up rate", gt=0, le=50, effect=Effect.PRICES)(
-        1.5, "how fast the nozzle gets hotter when it is near the heat of printing, °C/s: by it waiting is estimated"
+        1.5, "heating rate of the nozzle near printing temperature, °C/s: estimates of waiting use it"
     )
     bed_limit_c: float = advanced("Hottest bed", "maximum temperature heatbed", ge=0, le=300, effect=Effect.NONE)(
         120.0, "greatest bed temperature, °C; 0: no heated bed"
     )
     thumbnails_px: list[tuple[Pixels, Pixels]] = advanced(
         "Pictures in the G-code", "thumbnails preview", max_length=4, effect=Effect.NONE
-    )([], "width and height of the pictures in the G-code's head, pixels; web pages show them")
+    )([], "[width, height] of pictures in the G-code, pixels; web pages show them")
     uncalibrated: list[str] = rare("Keys without a source", "calibration", effect=Effect.NONE)(
-        [], "keys whose values no source gives; the dry run names them"
+        [], "keys without a source; the dry run names them"
     )
-    sources: dict[str, str] = rare("Sources of values", effect=Effect.NONE)(
-        {}, "for a key or a table of keys: where its value comes from"
-    )
+    sources: dict[str, str] = rare("Sources of values", effect=Effect.NONE)({}, "sources of keys, or of tables of keys")
     gcode: Blocks
 
     def heating_s(self, rise_c: float, since_s: float = 0.0) -> float:

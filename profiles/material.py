@@ -6,14 +6,14 @@ from profiles.frozen import Effect, Frozen, advanced, rare, simple
 class Material(Frozen):
     """A filament and how it wants to be melted."""
 
-    name: str = rare("Name of the material", "filament", effect=Effect.NONE)(..., "what people call it")
+    name: str = rare("Name of the material", "filament", effect=Effect.NONE)(..., "its name")
     diameter_mm: float = simple("Filament diameter", ge=1, le=4)(1.75, "filament diameter, mm")
     density_g_cm3: float = advanced("Density", "filament weight grams", gt=0, le=10, effect=Effect.NONE)(1.24, "density, g/cm³")
     price_per_kg: float | None = simple("Price per kilogram", "filament cost spool money", ge=0, le=1e6, effect=Effect.NONE)(
-        None, "what a kilogram costs, so that reports tell what a print costs; absent: they do not"
+        None, "price of a kilogram, for reports; absent: they have no price"
     )
     currency: str = simple("Currency of the price", "filament cost money euro dollar", max_length=12, effect=Effect.NONE)(
-        "", "what the price is counted in, as EUR; stands behind it in reports"
+        "", "currency, such as EUR; follows the price in reports"
     )
     nozzle_c: float = simple("Nozzle temperature", "hotend extruder printing heat", ge=150, le=450, effect=Effect.NONE)(
         ..., "nozzle temperature, °C"
@@ -22,34 +22,34 @@ class Material(Frozen):
         "First layer nozzle temperature", "initial layer hotend extruder heat", ge=150, le=450, effect=Effect.NONE
     )(..., "nozzle temperature of the first layer on the plate, °C")
     homing_nozzle_c: float = advanced("Nozzle temperature while homing", "preheat ooze hotend", ge=0, le=450, effect=Effect.NONE)(
-        150.0, "nozzle while the machine homes and the bed heats, °C: nothing may ooze at 150"
+        150.0, "nozzle while homing and heating the bed, °C: nothing may ooze at 150"
     )
     standby_c: float | None = advanced(
         "Nozzle temperature while paused", "standby idle hotend", ge=0, le=450, effect=Effect.NONE
-    )(None, "nozzle while a print is paused, °C; left out: as hot as it prints")
+    )(None, "nozzle during a pause, °C; left out: as for printing")
     bed_c: float = simple("Bed temperature", "heatbed build plate heat", ge=0, le=200, effect=Effect.NONE)(
         ..., "bed temperature, °C; 0: bed off"
     )
     fan: float = simple("Part fan, at most", "cooling fan speed maximum", ge=0, le=1, effect=Effect.NONE)(
-        ..., "part fan in layers that take least_layer_time_s or less"
+        ..., "fan in layers of least_layer_time_s or less"
     )
     fan_least: float = simple("Part fan, at least", "cooling fan speed minimum", ge=0, le=1, effect=Effect.NONE)(
-        0.35, "part fan in layers that take fan_layer_time_s or more, at most fan; between, in between"
+        0.35, "fan in layers of fan_layer_time_s or more; interpolated for shorter ones; at most fan"
     )
     fan_layer_time_s: float = advanced(
         "Least fan in layers longer than", "cooling layer time", gt=0, le=3600, effect=Effect.NONE
-    )(60.0, "layers that take longer have cooled by themselves and need only fan_least, s")
+    )(60.0, "longer layers need only fan_least, s")
     fan_bridge: float | None = advanced(
         "Part fan on bridges and overhangs", "cooling bridging bridges fan speed", ge=0, le=1, effect=Effect.NONE
-    )(None, "part fan on bridges and overhanging walls; absent: fan")
+    )(None, "fan on bridges and overhanging walls; absent: fan")
     fan_infill_bridge: float | None = rare(
         "Part fan over infill", "cooling internal bridge fan speed", ge=0, le=1, effect=Effect.NONE
-    )(None, "part fan on the first solid layer over sparse infill; absent: fan_bridge")
+    )(None, "fan on the first solid layer over infill; absent: fan_bridge")
     fan_off_layers: int = advanced(
         "First layers without fan", "cooling disable fan no cooling initial", ge=0, le=1000, effect=Effect.NONE
-    )(1, "lowest layers on the plate without any fan: they must stick to it")
+    )(1, "first layers without fan: they must stick to the plate")
     fan_full_layer: int = advanced("Full fan from layer", "cooling full fan speed at layer", ge=0, le=1000, effect=Effect.NONE)(
-        0, "layer above the plate from which the fan may blow fully; it rises evenly from fan_off_layers to there"
+        0, "first layer with full fan; the limit rises evenly after fan_off_layers"
     )
     interlayer_strength_mpa: float = rare("Strength across layers", "tensile bond", gt=0, le=500, effect=Effect.FRONT)(
         20.0,
@@ -58,39 +58,39 @@ class Material(Frozen):
     )
     cold_weld_factor: float = rare("Strength on cold plastic", "tensile bond weld", gt=0, le=1, effect=Effect.FRONT)(
         0.6,
-        "share of interlayer_strength_mpa where a part stands on plastic that has cooled: an assumption, no such joint has been "
-        "measured; strength across layers is 25 to 50 % below that along them, but 75 to 90 % with fibres or long times between "
-        "layers, Duty and others, Solid Freeform Fabrication 2018",
+        "share of interlayer_strength_mpa at a joint: an assumption, no such joint has been measured; strength across layers "
+        "is 25 to 50 % below that along them, but 75 to 90 % with fibres or long times between layers, Duty and others, Solid "
+        "Freeform Fabrication 2018",
     )
     bridge_longest_mm: float = advanced(
         "Longest bridge of this material", "bridging supports", ge=1, le=100, effect=Effect.FRONT
-    )(10.0, "level places spanned by straight lines up to this long, held at both ends, print without support, mm")
+    )(10.0, "longest bridge without support, mm")
     flow: float = simple("Flow", "extrusion multiplier flow ratio", ge=0.5, le=1.5)(1.0, "factor on all extruded volume")
     retract_mm: float = simple("Retraction", "retract length retraction distance stringing oozing", ge=0, le=15)(
-        ..., "filament pulled back before a travel that crosses outside, mm"
+        ..., "retraction before travels outside the part, mm"
     )
     retract_speed_mm_s: float = advanced("Retraction speed", "retract deretraction", gt=0, le=200)(
         35.0, "speed of retraction and priming, mm/s"
     )
     wipe_mm: float = advanced("Wipe", "retract retraction wipe while retracting stringing", ge=0, le=50)(
-        2.0, "way back over the paths just printed while filament is pulled back, mm; 2 mm rub the drop off, 0: none"
+        2.0, "wipe along the printed path during retraction, mm; 2 mm remove the drop, 0: none"
     )
     coast_mm: float = advanced("Coasting", "coast end of path ooze", ge=0, le=10, effect=Effect.NONE)(
-        0.0, "last stretch of a path before a retraction that is printed by pressure alone, mm; 0: no coasting"
+        0.0, "end of a path before a retraction, printed by pressure alone, mm; 0: no coasting"
     )
     retract_prime_extra_mm: float = advanced(
         "Extra filament after a retraction", "retract extra restart length deretraction", ge=0, le=2
-    )(0.0, "filament pushed beyond what was pulled back at the end of every retracted travel, mm")
+    )(0.0, "extra filament after each retraction, mm")
     prime_extra_mm: float = advanced("Extra filament after a turn of the table", "retract restart length prime", ge=0, le=10)(
-        0.0, "filament pushed beyond what was retracted after a reorientation, along the first stroke inside, mm"
+        0.0, "extra filament after a reorientation, in the first inner stroke, mm"
     )
     pressure_advance: float | None = advanced("Pressure advance", "linear advance K", ge=0, le=2, effect=Effect.NONE)(
         None,
-        "how much the extruder runs ahead of pressure, s: Marlin's M900 K, Klipper's SET_PRESSURE_ADVANCE, RepRapFirmware's "
-        "M572; absent: what the firmware has",
+        "pressure advance, s: Marlin's M900 K, Klipper's SET_PRESSURE_ADVANCE, RepRapFirmware's M572; absent: what the "
+        "firmware has",
     )
     volumetric_limit_mm3_s: float = advanced("Most plastic melted", "maximum volumetric speed flow limit", gt=0, le=200)(
-        ..., "most plastic the hot end melts, mm³/s"
+        ..., "greatest flow of the hot end, mm³/s"
     )
 
     @property

@@ -11,7 +11,7 @@ from typing import Any, Literal, Union, get_args, get_origin
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from profiles.frozen import unit_of
+from profiles.frozen import share_of, unit_of
 from profiles.messages import key_name, phrase
 
 LONGEST_VALUE = 60
@@ -79,6 +79,7 @@ def _sentence(problem: Any, text: str, root: type[BaseModel], prefix: str) -> st
 def _share_problem(given: Any, field: FieldInfo) -> str:
     """The value of a share and what it must be: a number for a file or an option, a percentage for the page."""
     number, meant = given if isinstance(given, float | int) else None, ""
+    share = share_of(given) if isinstance(given, str) else None
     least, most = (
         next(bound for rule in field.metadata for name in names if (bound := _bound(rule, name)) is not None)
         for names in (("ge", "gt"), ("le", "lt"))
@@ -88,7 +89,8 @@ def _share_problem(given: Any, field: FieldInfo) -> str:
         meant = f": write {number:g}"
     elif number is not None and most < number and 100.0 * least <= number <= 100.0 * most:
         meant = f": write {number:g}%"
-    terminal = f"{_shown(given)}: it must be {allowed(field)} or a percentage{meant}"
+    terminal = f"{_shown(given) if share is None else given}: it must be {allowed(field)} or a percentage{meant}"
+    number = number if share is None else share
     shown = _shown(given) if number is None else f"{100.0 * number:.6g} %"
     return phrase("page", terminal, f"{shown}: it must be a percentage{_range(field.metadata, 100.0)}")
 

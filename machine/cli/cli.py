@@ -5,6 +5,7 @@ Exit codes: 0 success, 1 user error, 3 bug (with a log file), 130 interrupted. H
 
 import errno
 import os
+import re
 import sys
 import threading
 from collections.abc import Iterator, Sequence
@@ -136,12 +137,18 @@ def _usage(error: TyperException, given: Sequence[str]) -> str:
     if files:
         return f"{files[0]} begins with a dash: write ./{files[0]}"
     command = context.command
+    if message.startswith("Missing") and (missing := getattr(error, "param", None)) is not None:
+        option = f"{missing.opts[-1]} " if missing.opts[-1].startswith("-") else ""
+        return f"{option}{missing.metavar} is missing: {missing.help}; see {context.command_path} --help"
     if (option := getattr(error, "option_name", None)) is not None:
         return _unknown("option", option, context.command_path, _option_names(command))
     commands = list(getattr(command, "commands", ()))
     words = [word for word in given if not word.startswith("-")][len(context.command_path.split()) - 1 :]
-    if commands and words and words[0] not in commands:
+    if commands and not words:
+        return f"a command of {context.command_path} is expected: {', '.join(commands)}"
+    if commands and words[0] not in commands:
         return _unknown("command", words[0], context.command_path, commands)
+    message = re.sub(r"Got unexpected extra argument\(s\) \((.*)\)", r"unexpected argument \1", message)
     return f"{_wrong_value(error) or message.removeprefix('Invalid value: ')}; see {context.command_path} --help"
 
 

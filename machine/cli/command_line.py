@@ -9,8 +9,7 @@ import typer
 
 from machine.cli.terminal import options, requests
 from machine.cli.terminal.options import option, with_option_groups
-from machine.notices import say
-from machine.pipeline.requests import BAUD, SIMULATED, Outputs
+from machine.pipeline.requests import BAUD, Outputs
 
 
 def decompose(
@@ -112,20 +111,17 @@ def print_(
     program: options.ProgramOptions,
     asked: requests.PrintOptions,
     given: options.ProfileOptions,
-    port: Annotated[str | None, option("--port PORT|sim", "serial port or print server; else sim, the simulated printer")] = None,
+    port: Annotated[str, option("--port PORT|sim", "serial port or print server; sim: the simulated printer")],
 ) -> int:
     """Print models or a G-code file on a printer or a simulated one.
 
-    Without --port it is the simulated one. PORT is a device (the command ports lists them), socket://HOST:PORT,
-    rfc2217://HOST:PORT, or a print server, which gets the program first: octoprint:HOST, moonraker:HOST or duet:HOST. The
-    printer is identified before anything moves or heats.
+    PORT is a device (the command ports lists them), socket://HOST:PORT, rfc2217://HOST:PORT, or a print server, which gets the
+    program first: octoprint:HOST, moonraker:HOST or duet:HOST. The printer is identified before anything moves or heats.
     Keys at a terminal: p pause, r resume, c cancel, + - feed, [ ] flow, e emergency stop. Ctrl-C cancels safely.
     """
     from machine.cli.commands.print import print_model
 
-    if port is None:
-        say("no --port is given, so the simulated printer prints; tiltprint ports lists real ones")
-    return print_model(options.program_request(models, program, given, force=asked.force), port or SIMULATED, asked)
+    return print_model(options.program_request(models, program, given, force=asked.force), port, asked)
 
 
 def send(

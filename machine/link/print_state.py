@@ -7,11 +7,13 @@ servers make it, the terminal and the pages show it. `ProgramPosition` follows p
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from enum import StrEnum
+from math import floor
 from typing import Any
 
 from machine.gcode.line_text import begins_layer, begun_part, read_line
 from machine.gcode.words import read_words, split_command
 from machine.link.protocol.events import Temperature
+from machine.quantities import duration
 
 OLD_HEAT_S = 15.0  # a printer reports every few seconds, or is queried
 
@@ -110,6 +112,12 @@ class PrintStatus:
     def heat_is_old(self) -> bool:
         """Whether the temperatures are outdated."""
         return self.heat_age_s >= OLD_HEAT_S or self.state in UNHEARD or self.state.is_over
+
+    def in_words(self, *more: str) -> str:
+        """The state with the share that is done, `more`, the time left, and what the user is to know."""
+        share = f", {floor(100.0 * self.share)} %" if self.share else ""
+        left = f"{duration(self.left_s)} left" if self.left_s else ""
+        return " · ".join(filter(None, (f"{self.state}{share}", *more, left, self.message, self.warning)))
 
     def json(self) -> dict[str, Any]:
         """The status for a page, with `at` as the only nested value, and what the state means: scripts list no states."""

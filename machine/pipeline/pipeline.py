@@ -84,7 +84,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     each = {}
     for name in dict.fromkeys(models):
         with naming(Path(name).name if request.beside else ""):
-            each[name] = _decompose_alone(requests[name], to_build)
+            each[name] = decompose_alone(requests[name], to_build)
     first = each[request.model]
     profile = first.profile if len(each) == 1 else request.profile  # each has an orientation of its own
     settings = {own.decomposition: own.profile.parts for own in each.values()}
@@ -92,7 +92,7 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     return replace(first, decomposition=decomposition, profile=profile, total_s=perf_counter() - began)
 
 
-def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
+def decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     """Decompose one of the models by itself."""
     record_file, given = request.outputs.record, read_given_plan(request)
     profile = with_plan_settings(request.profile, given)

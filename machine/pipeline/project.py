@@ -16,6 +16,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory, gettempdir
 from time import time
@@ -28,6 +29,7 @@ from machine.pipeline.profile_file import profile_text
 from machine.pipeline.project_record import (
     RECORD,
     VERSION,
+    VERSION_OF_ONE_MODEL,
     GivenRecord,
     NewerError,
     Record,
@@ -90,7 +92,8 @@ class Project:
     the model's rotation after reading; plan: None if the model is neither cut nor marked; parts: 0 before a decomposition;
     locked: the parts, counted from the second, whose planes are locked; stops: where the print waits for the user; marks_in_plan:
     the plan includes the boxes of the model's file; figures: of the print, for users and other programs; plate: of the model in a
-    slicer file; recommended: number of parts that the search prefers, 0: there was no search.
+    slicer file; recommended: number of parts that the search prefers, 0: there was no search; beside: name, model and number of
+    copies of each other model on the plate.
     """
 
     name: str
@@ -108,12 +111,16 @@ class Project:
     plate: int | None = None
     marks_in_plan: bool = False
     recommended: int = 0
+    beside: tuple[tuple[str, Path | None, int], ...] = ()
 
     def applied(self, request: ModelRequest, file: Path, copies: int | None) -> ModelRequest:
         """A request for the project's model: the project provides what the command line leaves open.
 
-        file: the project; copies: the user's number, None: the project's. Raises PlanError for conflicting options.
+        file: the project; copies: the user's number, of the first model alone, None: the plate is the project's. Raises PlanError
+        for conflicting options.
         """
+        if self.beside and copies is not None and copies > 1:
+            raise PlanError(f"{option('copies', copies)}: the project {file} says how many of each model stand on its plate")
         self.check_plate(request.plate, file)
         own_plan = self.plan if not request.plans and request.planes is None else None
         if own_plan is not None:
@@ -125,7 +132,8 @@ class Project:
             plans=request.plans if own_plan is None else (own_plan,),
             own_marks=own_plan is None or not self.marks_in_plan,
             stops=request.stops or self.stops,
-            copies=self.copies if copies is None else copies,
+            copies=self.copies if copies is None and not self.beside else copies or 1,
+            beside=self._beside() if copies is None and self.beside else (),
             plate=self.plate,
         )
 
@@ -144,26 +152,45 @@ class Project:
             )
 
     @property
+    def names(self) -> list[str]:
+        """The names of all models on the plate."""
+        return [self.name, *(name for name, _, _ in self.beside)]
+
+    @property
+    def files(self) -> list[Path]:
+        """The files of all models on the plate except demos."""
+        return [file for file in (self.model, *(file for _, file, _ in self.beside)) if file is not None]
+
+    @property
     def argument(self) -> str:
         """MODEL on a command line."""
-        return self.name if self.model is None else str(self.model)
+        return _argument(self.name, self.model)
+
+    def _beside(self) -> tuple[str, ...]:
+        """The models beside the first copy of the first one, on a command line."""
+        others = (count * [_argument(name, model)] for name, model, count in self.beside)
+        return tuple(chain((self.copies - 1) * [self.argument], *others))
+
+
+def _argument(name: str, model: Path | None) -> str:
+    return name if model is None else str(model)
 
 
 def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
     """Write a project's folder. Older models in it are deleted; profiles and meshes stay, for an undone step may name them.
     Raises OSError, ProfileError and PlanError; the record is written last, so that it only names existing files."""
     profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(project.given, kind)))}
-    model = "" if project.model is None else _copied(project.model, folder, "model")
+    models = {file: _copied(file, folder, "model") for file in project.files}
     if plan is not None:
         from mdp.search.plan_writing import plan_text  # loads tomlkit, which only projects need
 
         write_whole(folder / PLAN, plan_text(with_meshes(plan, folder), folder).encode())
     given = {**asdict(project.given), **profiles, "settings": list(project.given.settings)}
     record = checked_record(
-        version=VERSION,
+        version=VERSION if project.beside else VERSION_OF_ONE_MODEL,
         program=PROGRAM,
         name=project.name,
-        model=model,
+        model="" if project.model is None else models[project.model],
         given=GivenRecord(**given),
         own_profiles={kind: _bare_name(Path(getattr(project.given, kind))) for kind in profiles},
         rotation=[list(row) for row in project.rotation],
@@ -173,6 +200,7 @@ def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
         pauses=[stop.at for stop in project.stops if not stop.change],
         changes=[stop.at for stop in project.stops if stop.change],
         copies=project.copies,
+        beside=[(name, "" if file is None else models[file], copies) for name, file, copies in project.beside],
         plate=project.plate,
         marks_in_plan=project.marks_in_plan,
         recommended=project.recommended,
@@ -180,7 +208,7 @@ def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
     )
     write_whole(folder / RECORD, record.model_dump_json().encode())
     for file in folder.glob("model-*"):
-        if file.name != model:
+        if file.name not in models.values():
             file.unlink()
     if plan is None:
         (folder / PLAN).unlink(missing_ok=True)
@@ -222,9 +250,9 @@ def _with_mesh_files(plan: PlanFile, file_of: Callable[[Path], Path]) -> PlanFil
     return replace(plan, zones=replace(plan.zones, modifiers=modifiers, **marks))
 
 
-def _check_alone(model: Path | None) -> None:
+def _check_alone(model: Path) -> None:
     """Raise PlanError for a glTF file that refers to others, which a project would lack."""
-    if model is None or model.suffix.lower() != ".gltf":
+    if model.suffix.lower() != ".gltf":
         return
     document = json.loads(model.read_text(encoding="utf-8"))
     for buffer in document.get("buffers", []):
@@ -282,6 +310,7 @@ def _project_of(folder: Path, record: Record) -> Project:
         locked=tuple(record.locked),
         stops=record.stops,
         copies=record.copies,
+        beside=tuple((name, folder / Path(file).name if file else None, copies) for name, file, copies in record.beside),
         marks_in_plan=record.marks_in_plan,
         recommended=record.recommended,
         plate=record.plate,
@@ -293,11 +322,12 @@ def _project_of(folder: Path, record: Record) -> Project:
 
 def _check_inside(folder: Path, project: Project) -> None:
     """Raise PlanError when an unpacked project's files are not those it names, or have changed."""
-    if project.model is None and not project.name.startswith(DEMO):
-        raise PlanError(f"{RECORD}: model is missing")
-    if project.model is not None and not project.model.name.startswith("model-"):
-        raise PlanError(f"{RECORD}: model is {project.model.name!r}: a file model-... of the project is expected")
-    named = [project.model, *(Path(getattr(project.given, kind)) for kind in project.own_names), folder / PLAN]
+    for name, model in ((project.name, project.model), *((name, model) for name, model, _ in project.beside)):
+        if model is None and not name.startswith(DEMO):
+            raise PlanError(f"{RECORD}: model is missing")
+        if model is not None and not model.name.startswith("model-"):
+            raise PlanError(f"{RECORD}: model is {model.name!r}: a file model-... of the project is expected")
+    named = [*project.files, *(Path(getattr(project.given, kind)) for kind in project.own_names), folder / PLAN]
     for file in named:
         if file is not None and not file.is_file():
             raise PlanError(f"its file {file.name or RECORD} is missing")
@@ -348,9 +378,11 @@ def project_bytes(project: Project, plan: PlanFile, mesh: Mesh, picture: bytes) 
 
     Raises OSError, and PlanError for a project that could not be opened again.
     """
-    _check_alone(project.model)
-    if not is_file_name_anywhere(project.name):
-        raise PlanError(f"{project.name!r}: a project cannot keep a model of this name: rename its file")
+    for file in project.files:
+        _check_alone(file)
+    for name in project.names:
+        if not is_file_name_anywhere(name):
+            raise PlanError(f"{name!r}: a project cannot keep a model of this name: rename its file")
     content = io.BytesIO()
     with TemporaryDirectory(prefix="tiltprint-save-") as name:
         folder = Path(name)
@@ -384,11 +416,14 @@ def open_project(model: str) -> Project | None:
     lock = lock_folder(Path(folder.name))  # until the program exits
     _unpacked.append((folder, model, lock))
     project = unpack(Path(model), Path(folder.name))
-    if project.model is None:
-        return project
-    named = Path(folder.name) / ".model" / Path(project.name).name  # messages and G-code show the model's original name
-    named.parent.mkdir()
-    return replace(project, model=project.model.rename(named))
+    named = Path(folder.name) / ".model"  # messages and G-code show the models' original names
+    named.mkdir()
+
+    def renamed(name: str, file: Path | None) -> Path | None:
+        return None if file is None else Path(shutil.copyfile(file, named / Path(name).name))
+
+    beside = tuple((name, renamed(name, file), copies) for name, file, copies in project.beside)
+    return replace(project, model=renamed(project.name, project.model), beside=beside)
 
 
 def _tidy() -> None:

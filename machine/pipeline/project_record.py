@@ -13,7 +13,8 @@ from profiles.part_settings import MOST_PARTS
 from profiles.places import KINDS
 from profiles.wording import LONGEST_VALUE, sentences
 
-VERSION = 1
+VERSION = 2
+VERSION_OF_ONE_MODEL = 1  # of a project without other models, which older versions of this program can read
 RECORD = "work.json"
 LONGEST_NAME = 255  # bytes of a file name on any disk
 
@@ -42,7 +43,8 @@ class GivenRecord(_Table):
 
 
 class Record(_Table):
-    """A project's record, with the values of machine.pipeline.project.Project. model: a file of the project; "": a demo."""
+    """A project's record, with the values of machine.pipeline.project.Project. model: a file of the project; "": a demo;
+    beside: name, model and number of copies of each other model on the plate."""
 
     version: Annotated[int, BeforeValidator(_not_newer), Field(ge=1)]
     program: str = ""
@@ -57,6 +59,7 @@ class Record(_Table):
     pauses: list[str]
     changes: list[str]
     copies: Annotated[int, Field(ge=1, le=MOST_COPIES)]
+    beside: list[tuple[str, str, Annotated[int, Field(ge=1, le=MOST_COPIES)]]] = []
     plate: Annotated[int, Field(ge=0)] | None = None
     marks_in_plan: bool = True
     recommended: Annotated[int, Field(ge=0, le=MOST_PARTS)] = 0
@@ -73,8 +76,12 @@ class Record(_Table):
         if any(k >= max(self.parts, 1) - 1 for k in self.locked):
             raise ValueError(f"locked is {self.locked}: it must be places of the {max(self.parts, 1) - 1} planes, from 0")
         _ = self.stops
-        if not is_file_name_anywhere(self.name):
-            raise ValueError(f"name is {self.name!r}: it must be the name of a file")
+        names = [self.name, *(name for name, _, _ in self.beside)]
+        if len(set(names)) < len(names):
+            raise ValueError(f"beside names {', '.join(names[1:])} next to {self.name}: each model must occur once")
+        for name in names:
+            if not is_file_name_anywhere(name):
+                raise ValueError(f"name is {name!r}: it must be the name of a file")
         return self
 
     @property

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.reader.parsed import ParsedProgram
 from machine.program import Alternative, Program, joints_of_print
+from machine.quantities import duration
 from machine.view import paths, scene
 from machine.view.encoding import pack
 from machine.view.parts import front_records, page_colours
@@ -31,6 +32,7 @@ def of_parts(decomposition: Decomposition, profile: Profile, alternatives: Seque
         "front": front_records(decomposition),
         "report": parts_report(decomposition, profile, joints, alternatives),
     }
+    header["summary"] = _summary(header, None)
     run, none = dry_run((), profile), np.zeros(0, dtype=np.int64)  # the page has no paths
     by_layer = paths.layers_of(run.program, 1.0)
     table = paths.layer_columns(run.program, by_layer, run.times_s, run.times_s, none)
@@ -80,6 +82,7 @@ def of_print(
             ours=source != "foreign",
         ),
     }
+    header["summary"] = _summary(header, len(by_layer.first) if len(shown) else None)
     table = paths.layer_columns(run.program, by_layer, ends_s, height, shown)
     return pack(header, rows | text | table | scene.surfaces(decomposition, profile))
 
@@ -95,6 +98,7 @@ def _head(name: str, source: str, profile: Profile, known: bool) -> dict[str, An
     return {
         "format": FORMAT,
         "title": name,
+        "summary": "",
         "made_by": f"tiltprint {version('tiltprint')}",
         "source": source,
         "live": False,
@@ -112,6 +116,21 @@ def _head(name: str, source: str, profile: Profile, known: bool) -> dict[str, An
         "findings": [],
         "machine": scene.machine_bodies(profile.machine, known),
     }  # fmt: skip
+
+
+def _summary(header: dict[str, Any], layers: int | None) -> str:
+    """The page in a line: parts, layers (None: no paths), time and filament, and how much of a simplified print there is."""
+    parts, thinned = header["parts"], header["thinned"]
+    told = [_many(len(parts), "part")] if any(part["index"] for part in parts) else []
+    if layers is not None:
+        told += [_many(layers, "layer"), duration(header["time_s"]), f"{header['filament_mm'] / 1000.0:.2f} m of filament"]
+    if thinned:
+        told.append(f"thinned: {thinned['kept']:,} of {_many(thinned['rows'], 'move')}")
+    return " · ".join(told)
+
+
+def _many(count: int, thing: str) -> str:
+    return f"{count:,} {thing}{'s' * (count != 1)}"
 
 
 def _source(program: Program) -> str:

@@ -105,7 +105,7 @@ def test_firefox_drags_tilts_and_locks_a_plane_and_finds_the_others_beside_a_mar
         firefox.drag((x, y), (x, y - 12))
         firefox.wait(done("move a plane"))
         assert 12.0 < float(firefox.value("$('plane-offset').value")) < 20.0
-        firefox.value("$('hand-tilt-a').focus()")
+        firefox.value("$('hand-tilt-b').focus()")  # towards the eye
         firefox.key("ArrowUp")
         firefox.wait("Math.abs(Number($('plane-tilt').value) - 1) < 0.11")
         firefox.value("document.activeElement.blur()")

@@ -35,7 +35,7 @@ def test_a_dropped_file_is_looked_at_and_printed_as_it_is(tmp_path: Path) -> Non
         browser.wait("!$('run-ask').hidden")
         assert browser.value("$('run-title').textContent") == "box.gcode at the simulated printer"
         browser.click("#begin")
-        done = page.until(lambda seen: seen["over"])
+        done = page.until(lambda seen: seen["is_over"])
         assert done["sentence"] == "the print is done"
         assert set(GOOD.splitlines()) - {"M83"} <= set(commands_sent(Path(done["log"])))
         browser.click("[data-do=close_gcode]")

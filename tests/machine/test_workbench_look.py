@@ -24,6 +24,12 @@ MAIN = """[...document.querySelectorAll('#panel button')].filter((one) => one.ch
 # How far the tools stand out of the picture, px.
 OUTSIDE = """(() => { const [a, b] = ['plane-tools', 'scene'].map((id) => $(id).getBoundingClientRect());
   return Math.max(b.left - a.left, b.top - a.top, a.right - b.right, a.bottom - b.bottom); })()"""
+# Knobs of the plane that the tools or another knob stand over.
+COVERED = """[...document.querySelectorAll('#handles button')].filter((knob) => { const a = knob.getBoundingClientRect();
+  const over = (b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
+  const others = [...document.querySelectorAll('#plane-tools, #handles button')].filter((one) => one !== knob);
+  return others.some((one) => over(one.getBoundingClientRect()));
+}).map((knob) => knob.id)"""
 UNDO = "$('undo').getAttribute('aria-label')"
 SMALL = (900, 560)
 
@@ -84,6 +90,31 @@ def test_no_letter_is_small_and_one_button_is_the_next_step(browser: Browser, be
     assert seen == {"model": ["slice"], "parts": ["slice"], "slices": ["slice"], "printing": ["check"], "settings": ["slice"]}
 
 
+def test_settings_are_as_narrow_as_a_window_that_becomes_narrow(browser: Browser, bench: Running) -> None:
+    browser.resize(720, 900)
+    browser.open(bench.address)
+    browser.click("#tab-settings")
+    browser.wait("document.querySelectorAll('[data-key]').length > 10")
+    drawn = "new Promise((drawn) => setTimeout(() => drawn(true), 100))"
+    browser.wait(drawn)
+    browser.click("#tab-model")
+    browser.resize(390, 844)
+    browser.click("#tab-settings")
+    browser.wait(drawn)
+    assert browser.value("$('settings').scrollWidth <= $('settings').clientWidth")
+    browser.resize(*SMALL)
+
+
+def test_a_tool_for_the_whole_model_puts_parts_together_and_ends_when_they_are_apart(browser: Browser, bench: Running) -> None:
+    with_plane(browser, bench)
+    state = "[$('apart').value, $('measure').getAttribute('aria-pressed')]"
+    drag_slider(browser, "apart", 0.3, "input")
+    browser.click("#measure")
+    assert browser.value(state) == ["0", "true"]
+    drag_slider(browser, "apart", 0.3, "input")
+    assert browser.value(state) == ["0.3", "false"]
+
+
 def test_a_part_has_a_card_that_the_keyboard_chooses_and_locks(browser: Browser, bench: Running) -> None:
     with_plane(browser, bench)
     browser.wait("$('parts-list').textContent.includes('breaks at about')")
@@ -105,17 +136,21 @@ def test_a_part_has_a_card_that_the_keyboard_chooses_and_locks(browser: Browser,
 
 
 @pytest.mark.parametrize("size", [SMALL, (720, 900), (390, 844)])
-def test_the_tools_stand_in_the_picture_at_the_plane_and_say_why_it_is_refused(
+def test_the_tools_stand_in_the_picture_hide_no_knob_and_say_why_a_plane_is_refused(
     browser: Browser, bench: Running, size: tuple[int, int]
 ) -> None:
     browser.resize(*size)
     with_plane(browser, bench)
-    for view in ("front", "top"):
+    for view in ("front", "top", "corner"):
         browser.click(f"[data-view={view}]")
-        browser.wait(f"{OUTSIDE} <= 0")
-    drag_slider(browser, "plane-offset", 70, "change")
-    browser.wait("$('plane-told').classList.contains('refused') && $('plane-told').textContent.includes('misses the model')")
-    browser.wait(f"{OUTSIDE} <= 0")
+        browser.click("#fit")
+        browser.wait(f"{OUTSIDE} <= 0 && {COVERED}.length === 0")
+    drag_slider(browser, "plane-offset", 39.95, "change")
+    browser.wait("$('plane-told').classList.contains('refused') && $('put-near').checkVisibility()")
+    assert not browser.value("$('problem').checkVisibility()")  # it is told once
+    browser.wait(f"{OUTSIDE} <= 0 && {COVERED}.length === 0")
+    browser.click("#put-aside")
+    browser.wait("!$('plane-told').classList.contains('refused') && !$('put-near').checkVisibility()")
     browser.resize(*SMALL)
 
 

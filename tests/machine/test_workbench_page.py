@@ -24,22 +24,24 @@ UNITS = ["in metres", "in inches", "in centimetres"]  # that make it a size to p
 IDLE = "document.documentElement.dataset.busy === ''"
 
 
-def choose(browser: "Browser | Firefox", name: str, content: bytes) -> None:
+def choose(browser: "Browser | Firefox", name: str, content: bytes, field: str = "file") -> None:
     """A file chosen as a person does, and shown."""
     browser.value(
         f"""{{ const bytes = Uint8Array.from({list(content)}), chosen = new DataTransfer();
         chosen.items.add(new File([bytes], {json.dumps(name)}));
         document.documentElement.dataset.shown = '';
-        $('file').files = chosen.files;
-        $('file').dispatchEvent(new Event('change')); }}"""
+        $('{field}').files = chosen.files;
+        $('{field}').dispatchEvent(new Event('change')); }}"""
     )
 
 
 def open_model(browser: Browser, bench: Running, name: str, content: bytes) -> None:
     browser.open(bench.address)
     browser.wait(f"document.documentElement.dataset.version && {IDLE}")  # all of what lies there is shown
+    before, root = browser.value("document.documentElement.dataset.version"), "document.documentElement.dataset"
     choose(browser, name, content)
-    browser.wait(f"document.documentElement.dataset.shown && $('title').textContent === {json.dumps(name)} && {IDLE}")
+    opened = f"$('title').textContent === {json.dumps(name)} && $('undo').ariaLabel.startsWith('undo: open')"
+    browser.wait(f"{root}.shown && {root}.version > {before} && {opened} && {IDLE}")
 
 
 def saved(browser: Browser | Firefox, button: str) -> str:
@@ -66,7 +68,7 @@ def area(browser: Browser) -> float:
     return float(browser.value("$('overhang').textContent").removesuffix(" mm²"))
 
 
-def drag_slider(browser: Browser, slider: str, value: int, event: str) -> None:
+def drag_slider(browser: Browser, slider: str, value: float, event: str) -> None:
     browser.value(f"{{ $('{slider}').value = {value}; $('{slider}').dispatchEvent(new Event('{event}')); }}")
 
 
@@ -274,8 +276,8 @@ def test_a_plane_is_dragged_with_its_figures_and_one_that_cannot_be_cut_goes_bac
     browser.wait("!$('problem').hidden")
     assert "misses the model" in browser.value("$('problem').textContent")
     browser.wait(f"Math.abs(Number($('plane-offset').value) - {moved}) < 0.01 && !$('handles').hidden")
-    browser.click("#dismiss")
-    browser.wait("!$('trouble').checkVisibility()")
+    browser.click("#put-aside")
+    browser.wait("!$('trouble').checkVisibility() && $('put-near').hidden")
     drag_slider(browser, "plane-offset", 39.95, "change")  # 0.05 mm below the top
     browser.wait("$('put-near').checkVisibility()")
     browser.click("#put-near")

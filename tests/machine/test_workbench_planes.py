@@ -60,10 +60,8 @@ def test_a_plane_snaps_to_the_neck_nearby_and_where_there_is_none_that_is_told(b
         page.until(lambda state: state["undo"] == "move a plane")
         page.do("neck", part=2)
         problem = page.until(lambda state: state["problem"])["problem"]
-        assert (
-            problem == "there is no neck near the plane of part 2: "
-            "within 10 mm and 25 degrees no section is narrower than its surroundings"
-        )
+        where = "within 10 mm and 25 degrees no section is narrower than its surroundings"
+        assert problem == f"there is no neck near the plane of part 2: {where}"
 
 
 def test_marks_are_in_the_plan_that_the_command_line_cuts_by_and_drive_planes_away(bench: Running, folder: Path) -> None:

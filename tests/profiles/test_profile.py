@@ -145,6 +145,8 @@ def test_a_share_is_also_read_as_a_percentage() -> None:
             "process.infill_density=20",
             "process.infill_density is 20: it must be a number from 0 to 1 or a percentage: write 20%",
         ),
+        ("process.infill_density=150%", "process.infill_density is 150%: it must be a number from 0 to 1 or a percentage"),
+        ("process.infill_density=-5 %", "process.infill_density is -5 %: it must be a number from 0 to 1 or a percentage"),
         (
             "process.infill_density=0,35",
             'process.infill_density is "0,35": it must be a number from 0 to 1 or a percentage: write 0.35',

@@ -99,18 +99,11 @@ def figures(laid: Print, mesh: Mesh, profile: Profile, layers: int) -> Sequence[
     extrudes = program.kind == MoveKind.EXTRUDE
     pulls = program.e_mm < 0.0
     retractions = int((pulls & ~np.concatenate([[False], pulls[:-1]])).sum())
-    metres = [
-        float(length_mm[rows].sum()) / 1000.0
-        for rows in (
-            ~extrudes & (program.e_mm == 0.0),
-            extrudes & program.rows_of_types(Kind.OUTER_WALL.value),
-            extrudes & program.rows_of_types(Kind.INNER_WALL.value),
-        )
-    ]
-    minutes, filament_m = minutes_and_metres(program, profile)
-    thin_m = float(length_mm[extrudes & (program.width_mm > 0.0) & (program.width_mm < THIN_MM - 0.015)].sum()) / 1000.0
+    walls = (extrudes & program.rows_of_types(kind.value) for kind in (Kind.OUTER_WALL, Kind.INNER_WALL))
+    thin = extrudes & (program.width_mm > 0.0) & (program.width_mm < THIN_MM - 0.015)
+    *metres, thin_m = (length_mm[rows].sum() / 1000.0 for rows in (~extrudes & (program.e_mm == 0.0), *walls, thin))
     shares = band_shares(laid, mesh, profile.process.layer_height_mm, layers)
-    return (laid.core_s, minutes, filament_m, retractions, *metres, *shares, thin_m)
+    return (laid.core_s, *minutes_and_metres(program, profile), retractions, *metres, *shares, thin_m)
 
 
 def minutes_and_metres(program: ParsedProgram, profile: Profile) -> tuple[float, float]:

@@ -1,10 +1,9 @@
-"""One print, stage by stage: `python tools/bench/stages.py MODEL ... [--machine NAME] [--keep FOLDER]`.
+"""One print, stage by stage: `python tools/bench/stages.py MODEL ... [--machine NAME]`.
 
 Reading, one evaluation of all candidates of the search (`gains` and `sweep` of every direction), the search (without a change of
 orientation), slicing, planning, writing G-code, parsing it and the dry run each run in this process: core and wall seconds with
 loaded kernels. `--gcode FILE` measures parsing and the parts of the dry run for an existing program. A long program: `--set
-process.scale=2 --set process.layer_height_mm=0.1 --set process.infill_density=1 demo:figure`. `--keep` writes the G-code of each
-model.
+process.scale=2 --set process.layer_height_mm=0.1 --set process.infill_density=1 demo:figure`.
 """
 
 import argparse
@@ -41,18 +40,11 @@ def bench(given: argparse.Namespace) -> None:
     quick = load(machine=given.machine, settings=["process.layer_height_mm=0.3", "process.scale=0.5"])
     with redirect_stdout(StringIO()):
         check_in_stages(print_in_stages("demo:bracket", quick), quick)  # loads the kernels
-    for model in given.models if not given.gcode else ():
-        print(f"\n{model}")
+    for source in given.gcode or given.models:
+        print(f"\n{source}")
         heading("stage", "core s", "wall s", "memory so far MB")
-        lines = print_in_stages(model, profile)
-        if given.keep is not None:
-            given.keep.mkdir(parents=True, exist_ok=True)
-            (given.keep / f"{Path(model.removeprefix('demo:')).stem}.gcode").write_text("\n".join(lines) + "\n")
+        lines = source.read_text().splitlines() if given.gcode else print_in_stages(source, profile)
         check_in_stages(lines, profile)
-    for file in given.gcode:
-        print(f"\n{file}")
-        heading("stage", "core s", "wall s", "memory so far MB")
-        check_in_stages(file.read_text().splitlines(), profile)
 
 
 def stage(name: str, work: Callable[[], Result]) -> Result:
@@ -97,5 +89,4 @@ if __name__ == "__main__":
     parser = options_of(__doc__)
     parser.add_argument("--machine", default="generic_ac")
     parser.add_argument("--gcode", nargs="+", type=Path, default=[], metavar="FILE")
-    parser.add_argument("--keep", type=Path, metavar="FOLDER")
     run(parser, bench)

@@ -99,11 +99,10 @@ def columns() -> dict[str, list[tuple[str, str]]]:
         name = folder + (SHARED if shared else "")
         floor, files = package.get(name, (level[room], ""))
         package[name] = (floor if shared else level[room]), f"{files}, {file}" if files else file
-    return {name: [(box, text) for box, (_, text) in sorted(drawn[name].items(), key=_by_floor)] for name in LAYERS}
-
-
-def _by_floor(box: tuple[str, tuple[int, str]]) -> tuple[int, str]:
-    return box[1][0], box[0]
+    return {
+        name: [(box, text) for box, (_, text) in sorted(drawn[name].items(), key=lambda item: (item[1][0], item[0]))]
+        for name in LAYERS
+    }
 
 
 def draw() -> str:
@@ -130,6 +129,10 @@ def _box(x: float, y: float, room: str, text: str) -> list[str]:
     ]
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Write the picture."""
     PICTURE.write_text(draw(), encoding="utf-8")
-    print(f"wrote {PICTURE.name}")
+
+
+if __name__ == "__main__":
+    main()

@@ -5,7 +5,6 @@ a test can check whether it is current. Needs the extra `train` for matplotlib.
 """
 
 import re
-from pathlib import Path
 from typing import NamedTuple
 
 from tools.docs.harness import DOCS
@@ -47,11 +46,12 @@ def tables(text: str) -> dict[str, dict[str, list[float]]]:
     return found
 
 
-def draw(text: str, out: Path) -> None:
-    """Write the picture of a page's tables."""
+def main() -> None:
+    """Write the picture of the page's tables."""
     import matplotlib
     from matplotlib.figure import Figure
 
+    text = PAGE.read_text(encoding="utf-8")
     matplotlib.rcParams |= {"svg.hashsalt": "scale", "svg.fonttype": "none"}  # deterministic bytes
     columns, figure = tables(text), Figure(figsize=(10.0, 5.6), layout="constrained")
     for panel, axes in zip(PANELS, figure.subplots(2, 3).flat, strict=True):
@@ -62,7 +62,7 @@ def draw(text: str, out: Path) -> None:
         room = {"xlim": (0.0, 1.05 * max(x)), "ylim": (0.0, 1.1 * max(y))}
         axes.set(**{"xscale": "log", "yscale": "log"} if panel.logarithmic else room)
         axes.grid(color="#dddddd")
-    figure.savefig(out, metadata={"Date": None, "Description": described(text)})
+    figure.savefig(PICTURE, metadata={"Date": None, "Description": described(text)})
 
 
 def described(text: str) -> str:
@@ -72,5 +72,4 @@ def described(text: str) -> str:
 
 
 if __name__ == "__main__":
-    draw(PAGE.read_text(encoding="utf-8"), PICTURE)
-    print(f"wrote {PICTURE.name}")
+    main()

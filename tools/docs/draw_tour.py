@@ -3,7 +3,7 @@
 The model is demo:tree on the machine generic_ac with default settings. Needs the extra `train` for matplotlib.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -11,18 +11,14 @@ import numpy as np
 from machine.dryrun.dryrun import DryRun, dry_run
 from machine.gcode.writer import write_gcode
 from machine.pipeline.choice import pricing
-from machine.pipeline.pictures import best_view, floor_of, parts_apart
-from machine.pipeline.raster import draw
+from machine.pipeline.pictures import parts_picture, write_png
 from machine.planning.plan import plan
-from machine.view.parts import part_colours, residual_faces
-from mdp.cost.cost import needing_upright
-from mdp.decomposition import Decomposition
-from mdp.mesh import Mesh
+from mdp.mesh import Floats
 from mdp.model_file import locate
 from mdp.read import read_mesh
 from mdp.search.search import SearchRequest, decompose
 from profiles.machine import Machine
-from profiles.profile import Profile, load
+from profiles.profile import load
 from slicer.paths import Layer
 from slicer.slice import slice_parts
 from tools.docs.harness import DOCS
@@ -34,13 +30,11 @@ OUT = DOCS / "tour"
 MODEL = "demo:tree"
 LAYER = 40  # of the first part
 EXCERPT = 21  # lines of G-code around the first change of parts
-SIZE = (640, 320)
-FLOOR, GREY = (236.0, 238.0, 241.0), (214.0, 217.0, 222.0)
+WIDTH, HEIGHT = 640, 320
 
 
 def main() -> None:
     """Process the model, and draw each value."""
-    OUT.mkdir(exist_ok=True)
     profile = load()
     mesh, _ = read_mesh(locate(MODEL))
     decomposition = decompose(mesh, MODEL, profile, SearchRequest(price=pricing(profile)))
@@ -49,8 +43,9 @@ def main() -> None:
     lines = write_gcode(program, profile)
     run = dry_run(lines, profile)
     save("machine", head_over_table, profile.machine)
-    save("mesh", mesh_with_overhangs, mesh, profile)
-    save("parts", parts_moved_apart, decomposition, profile)
+    both = parts_picture(decomposition, profile, (2 * WIDTH, HEIGHT))
+    write_png(OUT / "mesh.png", both[:, :WIDTH])
+    write_png(OUT / "parts.png", both[:, WIDTH:])
     save("layer", strokes_by_kind, sliced[0].layers[LAYER])
     save("moves", axes_over_time, run)
     save("gcode", change_of_parts, lines)
@@ -82,34 +77,22 @@ def head_over_table(axes: "Axes", machine: Machine) -> None:
     axes.legend(loc="upper right", fontsize=8)
 
 
-def mesh_with_overhangs(axes: "Axes", mesh: Mesh, profile: Profile) -> None:
-    """The model, with faces that need support upright in red."""
-    risky = needing_upright(mesh, profile)
-    axes.imshow(draw([floor_of(mesh), mesh], [FLOOR, GREY], reds=[None, risky], axes=best_view(mesh, risky), size=SIZE))
-    axes.set_axis_off()
-
-
-def parts_moved_apart(axes: "Axes", decomposition: Decomposition, profile: Profile) -> None:
-    """The parts moved apart, with faces that still need support in red."""
-    mesh, parts = decomposition.mesh, decomposition.parts
-    reds = [residual_faces(part, profile) for part in parts]
-    view = best_view(mesh, needing_upright(mesh, profile))
-    colours = [FLOOR, *part_colours(len(parts))]
-    axes.imshow(draw([floor_of(mesh), *parts_apart(parts)], colours, reds=[None, *reds], axes=view, size=SIZE))
-    axes.set_axis_off()
-
-
 def strokes_by_kind(axes: "Axes", layer: Layer) -> None:
     """The strokes of a layer, coloured by kind."""
+    kinds = dict.fromkeys(path.kind for path in layer.paths)
+    add_lines(axes, 1.2, ([path.points for path in layer.paths if path.kind == kind] for kind in kinds), [*kinds])
+    axes.set(xlabel="x, mm", ylabel="y, mm", title=f"{len(layer)} strokes at z = {layer.z_mm:.2f} mm")
+    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+
+
+def add_lines(axes: "Axes", width: float, groups: Iterable[Sequence[Floats]], names: Sequence[str]) -> None:
+    """Lines in one colour for each group, at one scale of both axes."""
     from matplotlib.collections import LineCollection
 
-    for colour, kind in enumerate(dict.fromkeys(path.kind for path in layer.paths)):
-        paths = [path for path in layer.paths if path.kind == kind]
-        lines = LineCollection([path.points for path in paths], colors=f"C{colour}", linewidths=1.2, label=kind.value)
-        axes.add_collection(lines)
+    for number, (lines, name) in enumerate(zip(groups, names, strict=True)):
+        axes.add_collection(LineCollection(lines, colors=f"C{number}", linewidths=width, label=name))
     axes.autoscale()
-    axes.set(aspect="equal", xlabel="x, mm", ylabel="y, mm", title=f"{len(layer)} strokes at z = {layer.z_mm:.2f} mm")
-    axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=8)
+    axes.set(aspect="equal")
 
 
 def axes_over_time(axes: "Axes", run: DryRun) -> None:
@@ -131,14 +114,10 @@ def change_of_parts(axes: "Axes", lines: Sequence[str]) -> None:
 
 def beads_by_part(axes: "Axes", run: DryRun) -> None:
     """The plastic in the workpiece frame, seen from the front, coloured by part."""
-    from matplotlib.collections import LineCollection
-
     segments, part = run.deposited.segments(), run.program.part[run.segment_row]
-    for number in np.unique(part):
-        lines = LineCollection(segments[part == number][:, :, [0, 2]], colors=f"C{number}", linewidths=0.2)
-        axes.add_collection(lines)
-    axes.autoscale()
-    axes.set(aspect="equal", xlabel="x, mm", ylabel="z, mm")
+    numbers = np.unique(part)
+    add_lines(axes, 0.2, (segments[part == number][:, :, [0, 2]] for number in numbers), [f"{number}" for number in numbers])
+    axes.set(xlabel="x, mm", ylabel="z, mm")
 
 
 if __name__ == "__main__":

@@ -28,6 +28,7 @@ from tools.docs.harness import ROOT
 
 FOLDER = ROOT / "mdp" / "demos"
 PICTURE_SIZE, PICTURE_COLOURS = (136, 102), 32
+FINER = 3  # times as many pixels are drawn for each that is kept
 Point = tuple[float, float, float]
 Knot = tuple[float, float, float, float]
 Limb = list[Knot]  # x, y, z, radius of the knots of a chain of round cones
@@ -166,6 +167,7 @@ NOTCH_MM, DEEP_MM, LONG_MM, SHORT_MM, GAP_MM = 0.8, 1.0, 3.2, 2.2, 0.3
 PADS, ARM_MM, EDGE_MM, OVER_MM = 4, 24.0, 1.2, 0.02
 PAD_MM, PAD_HEIGHT_MM = ((-10.2, -8.6), (9.2, 8.6)), 1.2  # least and greatest u and v
 DOT_MM = 1.5
+ABOVE_MM = PAD_MM[1][1] + EDGE_MM  # from the centre of a face up to its edge
 
 
 def calibration(lean_deg: float, clear_mm: float) -> m3.Manifold:
@@ -175,14 +177,14 @@ def calibration(lean_deg: float, clear_mm: float) -> m3.Manifold:
     clear_mm: height above the plate below which no pad may reach.
     """
     lean, half = math.radians(lean_deg), 0.5 * ARM_MM
-    below_mm, above_mm = LONG_MM + GAP_MM - PAD_MM[0][1] + EDGE_MM, _above_mm()
+    below_mm = LONG_MM + GAP_MM - PAD_MM[0][1] + EDGE_MM
     middle_mm = _middle_mm(lean, clear_mm)
-    low, high = middle_mm - below_mm * math.sin(lean), middle_mm + above_mm * math.sin(lean)
-    run = (below_mm + above_mm) * math.cos(lean)
+    low, high = middle_mm - below_mm * math.sin(lean), middle_mm + ABOVE_MM * math.sin(lean)
+    run = (below_mm + ABOVE_MM) * math.cos(lean)
     outline = [(-half - run, 0), (half + run, 0), (half + run, low), (half, high), (-half, high), (-half - run, low)]
     roof = m3.Manifold.extrude(m3.CrossSection([outline]), ARM_MM).translate((0, 0, -half)).rotate((90, 0, 0))
     solid = roof + roof.rotate((0, 0, 90))
-    place = (half + above_mm * math.cos(lean), 0.0, middle_mm)
+    place = (half + ABOVE_MM * math.cos(lean), 0.0, middle_mm)
     frame = np.column_stack([(0, 1, 0), (-math.cos(lean), 0, math.sin(lean)), (math.sin(lean), 0, math.cos(lean)), place])
     for k in range(PADS):
         grooves, pad = (piece.transform(frame).rotate((0, 0, 90.0 * k)) for piece in (_grooves(lean), _pad(lean, k + 1)))
@@ -194,14 +196,9 @@ def roofs(lean_deg: float, clear_mm: float) -> list[Plane]:
     """The base planes of the pads: just above the roofs, which stay whole."""
     lean = math.radians(lean_deg)
     out, up = math.sin(lean), math.cos(lean)
-    offset = (0.5 * ARM_MM + _above_mm() * math.cos(lean)) * out + _middle_mm(lean, clear_mm) * up + OVER_MM
+    offset = (0.5 * ARM_MM + ABOVE_MM * math.cos(lean)) * out + _middle_mm(lean, clear_mm) * up + OVER_MM
     quarters = ((1, 0), (0, 1), (-1, 0), (0, -1))
     return [Plane(np.array([out * x, out * y, up]), offset) for x, y in quarters]
-
-
-def _above_mm() -> float:
-    """From the centre of a face up to its edge, mm."""
-    return PAD_MM[1][1] + EDGE_MM
 
 
 def _middle_mm(lean: float, clear_mm: float) -> float:
@@ -298,9 +295,15 @@ def write_plan(folder: Path, name: str) -> None:
 
 
 def write_picture(folder: Path, name: str) -> None:
-    """Write the small picture of a demo beside it."""
+    """Write the small picture of a demo, on a transparent background, beside it."""
     mesh, _ = read_mesh(folder / f"{name}.ply")
-    picture = Image.fromarray(draw([mesh], [PLAIN], size=PICTURE_SIZE)).quantize(PICTURE_COLOURS)
+    width, height = PICTURE_SIZE
+    fine = draw([mesh], [PLAIN], size=(FINER * width, FINER * height)).reshape(height, FINER, width, FINER, 3)
+    covered = (fine != 255).any(axis=4, keepdims=True)
+    share = covered.mean(axis=(1, 3))
+    colour = (fine * covered).mean(axis=(1, 3)) / np.maximum(share, 1e-9)
+    pixels = np.concatenate([colour, 255 * share], axis=2).round().astype(np.uint8)
+    picture = Image.fromarray(pixels).quantize(PICTURE_COLOURS, Image.Quantize.FASTOCTREE)
     picture.save(folder / f"{name}.png", optimize=True)
 
 

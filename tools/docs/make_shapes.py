@@ -1,7 +1,7 @@
 """Make the shapes that planes cannot print according to hydra5x: `python tools/docs/make_shapes.py FOLDER` writes STL files.
 
-They are generated from its descriptions (maker-fab/hydra5x, docs/decisions.md). docs/parts.md has their costs in parts and in one
-piece: `tiltprint export FOLDER/elbow.stl --as-is [--parts 1] -o elbow.gcode`.
+They are generated from its descriptions (maker-fab/hydra5x, docs/decisions.md). tools/RESULTS.md has their costs in parts and in
+one piece: `tiltprint export FOLDER/elbow.stl --as-is [--parts 1] -o elbow.gcode`.
 """
 
 import sys

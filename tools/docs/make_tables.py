@@ -1,6 +1,6 @@
 """Makes the parts of the docs that follow from code: `python tools/docs/make_tables.py`; tests hold them against the code.
 
-docs/keys.md: the tables of all keys. docs/serial.md: the states of a conversation with a printer, as the sender uses them.
+docs/keys.md: the tables of all keys. docs/states.mmd: the states of a conversation with a printer, as the sender uses them.
 """
 
 import json
@@ -8,20 +8,23 @@ import re
 from collections import defaultdict
 from typing import Any
 
-from machine.link.protocol.states import TABLE, Signal, State
+from machine.link.protocol.states import TABLE, State
 from profiles.profile import SECTIONS, load
 from profiles.wording import allowed, keys
 from tools.docs.harness import DOCS, marked
 
-KEYS, SERIAL = DOCS / "keys.md", DOCS / "serial.md"
+KEYS, STATES = DOCS / "keys.md", DOCS / "states.mmd"
 AXIS = re.compile(r"(?<=^machine)\.(x|y|z|tilt|turn)\.")
+UNIT = re.compile(r", (°C|N|s|deg|g/cm³|mm²|mm|MPa)(/s²|/s)?$|, mm³/s$")
 SHORT = {
     "^a whole number from (.*)": r"\1, whole",
     "^a number (from )?": "",
+    "above 0 and up to ": "≤ ",
     "above (\\S+) and up to ": r"> \1, ≤ ",
     r"(-?[\d.]+) to (-?\d)": r"\1–\2",
-    "true or false": "true, false",
+    "true or false": "true/false",
     "^(a list of|one of|a|one) ": "",
+    "tables with the keys ": "tables of ",
     '"': "",
 }
 
@@ -59,9 +62,9 @@ def _joined(names: list[str]) -> str:
 
 
 def _beginning(meaning: str) -> str:
-    """A meaning up to its first semicolon, or to a colon or bracket behind three words or more."""
+    """A meaning up to its first semicolon, or to a colon or bracket behind three words or more, without the unit."""
     found = re.match(r"(?:\S+ ){2}\S+?[^;:(]*(?=[;:(])|[^;]*", meaning)
-    return (found[0] if found else meaning).rstrip()
+    return UNIT.sub("", (found[0] if found else meaning).rstrip())
 
 
 def _short(values: str) -> str:
@@ -73,28 +76,22 @@ def _short(values: str) -> str:
 
 def diagram() -> str:
     """The table of states as a Mermaid diagram with an arrow for each pair of states."""
-    lines = ["```mermaid", "stateDiagram-v2", f"    [*] --> {next(iter(State)).name}"]
+    lines = ["stateDiagram-v2", f"    [*] --> {next(iter(State)).name}"]
     for state, row in TABLE.items():
         leads: dict[State, list[str]] = defaultdict(list)
         for signal, target in row.items():
-            leads[target].append(_word(signal))
+            leads[target].append(signal.name.lower().replace("_", " "))
         lines += [f"    {state.name} --> {target.name}: {', '.join(words)}" for target, words in leads.items()]
     lines += [f"    {state.name} --> [*]" for state, row in TABLE.items() if not row]
-    lines.append("```")
     return "\n".join(lines) + "\n"
 
 
-def _word(signal: Signal) -> str:
-    return signal.name.lower().replace("_", " ")
-
-
 def page(text: str) -> str:
-    """A page with its tables and its diagram made again."""
-    text = marked(text, r"keys of (\w+)", lambda match: table(match[2]))
-    return marked(text, "states", lambda match: diagram())
+    """A page with its tables made again."""
+    return marked(text, r"keys of (\w+)", lambda match: table(match[2]))
 
 
 if __name__ == "__main__":
-    for file in (KEYS, SERIAL):
-        file.write_text(page(file.read_text(encoding="utf-8")), encoding="utf-8")
+    for file, text in ((KEYS, page(KEYS.read_text(encoding="utf-8"))), (STATES, diagram())):
+        file.write_text(text, encoding="utf-8")
         print(f"wrote {file.name}")

@@ -1,7 +1,9 @@
 """The export command, which writes G-code and a picture of a layer, and the save command, which writes a project as 3MF."""
 
 import re
+from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from machine.cli.terminal.report import compare_table, joints_table, print_price, print_table, verdict, written_line
@@ -107,7 +109,7 @@ def save(request: ModelRequest, out: Path) -> int:
         raise OutputError(f"output {out}: a project is a 3MF file: a name that ends in {SUFFIX} is expected")
     check_writable(out)
     check_model_files(request, (("project", out),))
-    decomposed = decompose_model(request)
+    decomposed = decompose_model(replace(request, copies=1, beside=()))
     decomposition = decomposed.decomposition
     check_stop_parts(request.stops, len(decomposition.parts))
     picture = png_bytes(parts_together(decomposition, decomposed.profile, PICTURE_PX))
@@ -121,14 +123,18 @@ def save(request: ModelRequest, out: Path) -> int:
 def _project(request: ModelRequest, decomposed: Decomposed) -> Project:
     decomposition, orientation = decomposed.decomposition, decomposed.plan.orientation
     names = {kind: name or DEFAULTS[kind] for kind, name in zip(DEFAULTS, request.profile_names, strict=True)}
+    files = {name: None if name.startswith(DEMO) else Path(name) for name in (request.model, *request.beside)}
+    beside = Counter(request.beside)
+    copies = request.copies * (1 + beside.pop(request.model, 0))
     return Project(
         name=request.name,
-        model=None if request.model.startswith(DEMO) else Path(request.model),
+        model=files[request.model],
         given=Given(**names, settings=request.settings),
         rotation=STANDING if orientation is None else orientation,
         parts=len(decomposition.parts),
         stops=request.stops,
-        copies=request.copies,
+        copies=copies,
+        beside=tuple((name if files[name] is None else Path(name).name, files[name], count) for name, count in beside.items()),
         figures=figures_of(decomposition.chosen),
         plate=request.plate,
         marks_in_plan=not request.own_marks,

@@ -1,7 +1,7 @@
 """States of a conversation with a printer, and all transitions in one table.
 
 connection.py translates events to signals and acts on entering a state. A signal missing in a state's row leaves the state
-unchanged. `python tools/docs/make_tables.py` writes the table into docs/serial.md.
+unchanged. `python tools/docs/make_tables.py` draws the table in docs/states.mmd.
 """
 
 from enum import Enum

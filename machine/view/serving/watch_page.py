@@ -56,14 +56,26 @@ class Watched:
         self._asked.set()
         if self._ended:
             self._end_reported.set()
-        status, ended = self._status, self._ended
-        return json.dumps((replace(status, state=ended) if ended else status).json()).encode()
+        status = replace(self._status, state=self._ended) if self._ended else self._status
+        return json.dumps(status.json() | {"told": _told(status)}).encode()
 
     def end(self, state: PrintState) -> None:
         """Set the final state once, and wait briefly until a page that has polled before receives it."""
         self._ended = self._ended or state
         if self._asked.is_set():
             self._end_reported.wait(LAST_WORD_S)
+
+
+def _told(status: PrintStatus) -> str:
+    """How the print is, in one line."""
+    heat = status.temperature
+    temperatures = [
+        f"{name} {now_c:.0f}" + (f" of {target_c:.0f}" if target_c else "") + " °C"
+        for name, now_c, target_c in (("nozzle", heat.nozzle_c, heat.nozzle_target_c), ("bed", heat.bed_c, heat.bed_target_c))
+        if now_c is not None
+    ]
+    old = ["as last known"] if status.heat_is_old and temperatures else []
+    return status.in_words(f"line {status.file_line}" if status.file_line else "", *temperatures, *old)
 
 
 @contextmanager

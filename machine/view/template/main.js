@@ -1,6 +1,6 @@
 // Main: the page put together: bytes to print, print to picture, hands to scene.
 
-import { $, bells, duration, listen, notice, tell, themeSwitch, toggle } from "./elements.js";
+import { $, bells, listen, notice, tell, themeSwitch, toggle } from "./elements.js";
 import { compileAll, pictureOf, standing } from "./moves/picture.js";
 import { printOf } from "./moves/rows.js";
 import { sceneOf } from "./moves/scene.js";
@@ -17,9 +17,9 @@ async function main() {
   const gl = cardOf($("canvas")), text = $("tiltprint").textContent.trim();
   if (gl) compileAll(gl);
   $("tiltprint").textContent = "";
-  const print = await printOf(text), { header, rows } = print;
+  const print = await printOf(text), { header } = print;
   const ring = bells(), camera = cameraOf(), scene = sceneOf(print, ring);
-  tell({ title: header.title, summary: summaryOf(header, rows) });
+  tell({ title: header.title, summary: header.summary });
   showReport(header);
   controlsOf(print, scene, ring);
   frontOf(print, scene);
@@ -28,7 +28,7 @@ async function main() {
   layerTimes(scene, ring);
   const chooseTheme = themeSwitch((dark) => { scene.dark = dark; ring.ring("theme"); }), player = courseOf(print, scene, ring);
   const findings = findingsOf(print, scene, ring, camera, player), code = textOf(print, scene, ring, player);
-  scene.go(rows.count - 1);
+  scene.go(print.rows.count - 1);
   outsideOf({ scene, findings, code, chooseTheme, camera, bells: ring });
   if (!gl) return withoutPicture();
   const picture = pictureOf(gl, print, scene, camera, ring, findings.showMarkers);
@@ -38,14 +38,6 @@ async function main() {
   if (header.live && location.protocol.startsWith("http")) follow(scene, player);
   document.documentElement.dataset.openedMs = performance.now().toFixed(0);
   document.documentElement.dataset.state = "ready";
-}
-
-function summaryOf({ time_s: seconds, filament_mm: filament, parts, thinned }, { count, layers }) {
-  const many = (number, thing) => `${number.toLocaleString("en")} ${thing}${number === 1 ? "" : "s"}`;
-  const told = parts.some((part) => part.index) ? [many(parts.length, "part")] : [];
-  if (count) told.push(many(layers.length, "layer"), duration(seconds), `${(filament / 1000).toFixed(2)} m of filament`);
-  if (thinned) told.push(`thinned: ${thinned.kept.toLocaleString("en")} of ${many(thinned.rows, "move")}`);
-  return told.join(" · ");
 }
 
 /** Puts the work into view, and keeps it there when the table moves and when the frame is changed. */

@@ -7,7 +7,7 @@ from math import atan2
 import numpy as np
 
 from machine.pipeline.project import STANDING
-from machine.pipeline.requests import Given
+from machine.pipeline.requests import MOST_COPIES, Given
 from machine.planning.stops import Stop
 from machine.workbench.bench.model import Model, Placing, moved_part, moved_zones
 from machine.workbench.bench.part_settings import gone_in_words, number_after, renumbered, renumbered_stops, values_in_words
@@ -20,6 +20,7 @@ from mdp.search.front import Weights, choose, pareto_optimal
 from mdp.search.plan_file import PlanFile, PlannedPart, planned_parts
 from mdp.zone import NO_ZONES, Zones
 from profiles.effect import effect_of_change
+from profiles.errors import PlanError
 from profiles.frozen import Effect, Vector
 from profiles.messages import option
 from profiles.part_settings import PartSettings
@@ -37,8 +38,9 @@ class Bench:
     rotation: rows of the matrix that turns the model as read. cuts: base planes of parts 2, 3, ... in print order; None: not cut
     yet. rows: the front from which the cuts were chosen, with increasing numbers of parts; recommended: number of parts that the
     search prefers, 0: no search yet; priced: times and filament of the rows are those for this profile. locked: cuts that a
-    search keeps and that cannot be moved. stops: pauses, each of which follows its part; copies: of the model on the plate; both
-    remain until another model is opened. notes: those of the search that found the rows.
+    search keeps and that cannot be moved. stops: pauses, each of which follows its part; copies: of the model on the plate;
+    beside: the other models there, each with its number of copies; all three remain until another model is opened. notes: those
+    of the search that found the rows.
     """
 
     profile: Profile
@@ -53,6 +55,7 @@ class Bench:
     priced: bool = True
     stops: tuple[Stop, ...] = ()
     copies: int = 1
+    beside: tuple[tuple[Model, int], ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
@@ -62,8 +65,9 @@ class Bench:
 
     @property
     def planned(self) -> bool:
-        """Whether it has cuts or zones, which only a plan file can store."""
-        return self.cuts is not None or self.zones != NO_ZONES
+        """Whether it has cuts or zones, which only a plan file can store, or other models beside it, which options of a single
+        model do not go with."""
+        return self.cuts is not None or self.zones != NO_ZONES or bool(self.beside)
 
     @property
     def worked_on(self) -> bool:
@@ -89,7 +93,7 @@ class Bench:
     @property
     def printed(self) -> tuple[object, ...]:
         """Everything that determines the print."""
-        return *self.shaped, self.stops, self.copies
+        return *self.shaped, self.stops, self.copies, self.beside
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,10 +142,10 @@ def _nearest_steps(steps: tuple[Step, ...]) -> tuple[Step, ...]:
     """The nearest steps whose models fit into memory; always includes the nearest one."""
     models, faces = set[Model](), 0
     for back, step in enumerate(reversed(steps)):
-        model = step.bench.model
-        if model is not None and model not in models:
-            models.add(model)
-            faces += model.faces
+        for model in (step.bench.model, *(other for other, _ in step.bench.beside)):
+            if model is not None and model not in models:
+                models.add(model)
+                faces += model.faces
         if faces > MOST_KEPT_FACES and back:
             return steps[-back:]
     return steps
@@ -173,9 +177,28 @@ def with_model(bench: Bench, model: Model) -> Bench:
 
 
 def with_model_anew(bench: Bench, model: Model | None) -> Bench:
-    """The bench with the same model read, turned or cut again: keeps pauses, copies and the settings of part 1."""
+    """The bench with the same model read, turned or cut again: keeps pauses, the rest of the plate and the settings of part 1."""
     profile = renumbered(bench.profile, bench.cuts or (), ())
-    return replace(emptied(bench), model=model, profile=profile, stops=bench.stops, copies=bench.copies)
+    kept = replace(emptied(bench), stops=bench.stops, copies=bench.copies, beside=bench.beside)
+    return replace(kept, model=model, profile=profile)
+
+
+def with_beside(bench: Bench, beside: tuple[tuple[Model, int], ...]) -> Bench:
+    """Replace the other models on the plate. Raises PlanError for a name that occurs twice, because messages and the command
+    line identify models by their names, and for more models than a plate may have."""
+    assert bench.model is not None
+    names = {bench.model.name}
+    for model, _ in beside:
+        if model.name in names:
+            raise PlanError(f"{model.name} is on the plate already: set its number of copies to print more")
+        names.add(model.name)
+    if bench.model.plate is not None and beside:
+        raise PlanError(
+            f"plate {bench.model.plate} of {bench.model.name} is open: models go beside the first plate of a file only"
+        )
+    if (count := bench.copies + sum(copies for _, copies in beside)) > MOST_COPIES:
+        raise PlanError(f"{count} models are to stand on the plate: {MOST_COPIES} at most are allowed")
+    return replace(bench, beside=beside)
 
 
 def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:

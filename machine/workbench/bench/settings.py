@@ -130,17 +130,27 @@ def settings_list(profile: Profile, given: Given, part: int = 0) -> list[dict[st
         rows = list(_all_rows(profile))
         for row in rows:
             key = row["key"]
-            row |= {"changed": key in changed, "unchanged": unchanged.get(key) if key in changed else None}
+            row |= _change(row, key in changed, unchanged.get(key))
             # names that a G-code block may contain in braces
             row["placeholders"] = list(block_values(profile, key.removeprefix(BLOCKS_OF))) if key.startswith(BLOCKS_OF) else []
         return rows
     own, allowed = own_values(profile, part), set(part_keys()) - (OF_PARTS_ON_PLASTIC if part == 1 else set())
     own_rows, of_all = (_process_rows(sliced) for sliced in (profile.of_part(part), profile))
-    return [
-        {**row, "changed": name in own, "unchanged": of_all[name]["value"] if name in own else None}
-        for name, row in own_rows.items()
-        if name in allowed
-    ]
+    return [row | _change(row, name in own, of_all[name]["value"]) for name, row in own_rows.items() if name in allowed]
+
+
+def _change(row: dict[str, Any], changed: bool, value: Any) -> dict[str, Any]:
+    """Whether a key was changed, and the profile's value in words, if it is short."""
+    if not changed or row["kind"] in ("block", "rows"):
+        return {"changed": changed, "was": "Reset to the profile" if changed else ""}
+    if isinstance(value, bool):
+        text = "on" if value else "off"
+    elif value in (None, ""):
+        text = "nothing"
+    else:
+        text = f"{value:.12g}" if isinstance(value, float) else f"{value}"
+        text = f"{text} {row['unit']}".rstrip()
+    return {"changed": True, "was": f"Profile value: {text}"}
 
 
 def _unchanged(given: Given) -> Profile | None:
@@ -172,6 +182,7 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
         matter = next(kind for kind in reversed(model.__mro__) if issubclass(kind, Frozen) and name in kind.model_fields)
         own = f"{prefix}: {matter.__name__.lower()}" if matter is not model else prefix
         assert isinstance(field.json_schema_extra, dict)
+        kind = _kind(schema[name], values[name], unit_of(name))
         yield {
             "key": f"{prefix}.{name}",
             "label": field.title,
@@ -181,9 +192,9 @@ def _rows(prefix: str, model: type[Frozen], values: dict[str, Any], group: str =
             "group": group or own,
             "title": TITLES[group or own],
             "about": about or _sentence(matter),
-            "meaning": field.description or "",
+            "meaning": _with_range(field.description or "", kind["least"], kind["most"]),
             "optional": may_be_left_out(field.annotation),
-            **_kind(schema[name], values[name], unit_of(name)),
+            **kind,
         }
 
 
@@ -212,6 +223,13 @@ def _kind(schema: dict[str, Any], value: Any, unit: str) -> dict[str, Any]:
     return {"kind": kind, "least": least, "most": most, "choices": way.get("enum", []), "value": value}
 
 
+def _with_range(meaning: str, least: float | None, most: float | None) -> str:
+    """A key's meaning as a sentence with the allowed range."""
+    ends = ["…" if end is None else f"{end:.12g}" for end in (least, most)]
+    allowed = "" if least is None and most is None else f" ({' to '.join(ends)})"
+    return f"{meaning[:1].upper()}{meaning[1:]}{allowed}."
+
+
 def _sentence(model: type[Frozen]) -> str:
     """First paragraph of a table's docstring."""
     return (model.__doc__ or "").strip().partition("\n\n")[0].replace("\n    ", " ").rstrip(".")
@@ -230,7 +248,9 @@ def export_command(bench: Bench) -> str:
         return ""
     given, stem = bench.given, file_stem(bench)
     named = [(kind, getattr(given, kind)) for kind in DEFAULTS if getattr(given, kind) != DEFAULTS[kind]]
-    words = ["tiltprint", "export", bench.model.name, *(word for kind, name in named for word in (f"--{kind}", name))]
+    plate = [(bench.model.name, bench.copies), *((model.name, copies) for model, copies in bench.beside)]
+    models = [f"{name}:{copies}" if bench.beside and copies > 1 else name for name, copies in plate]
+    words = ["tiltprint", "export", *models, *(word for kind, name in named for word in (f"--{kind}", name))]
     settings = list(given.settings)
     if not bench.planned and bench.turned is not None:
         settings = [setting for setting in settings if key_of(setting) != "process.rotate_deg"]
@@ -244,7 +264,7 @@ def export_command(bench: Bench) -> str:
         words += ["--parts", "1", "--as-is"]
         for own in bench.profile.parts:
             words += ["--part", option(own)]
-    if bench.copies != 1:
+    if bench.copies != 1 and not bench.beside:
         words += ["--copies", str(bench.copies)]
     words += [word for stop in bench.stops for word in (f"--{stop.option}", stop.at)]
     return join([*words, "-o", f"{stem}.gcode"])

@@ -62,9 +62,9 @@ def read_command(asked: Asked, commands: Mapping[str, type[Arguments]]) -> tuple
     """Name and arguments of a page command. Raises PlanError."""
     name = asked.get("do")
     if not isinstance(name, str):
-        raise PlanError("what the page has sent names no command: docs/workbench.md lists them")
+        raise PlanError("what the page has sent names no command: docs/workbench-protocol.md lists them")
     if name not in commands:
-        raise PlanError(f"{name!r} is no command: docs/workbench.md lists them")
+        raise PlanError(f"{name!r} is no command: docs/workbench-protocol.md lists them")
     try:
         return name, commands[name].model_validate(asked)
     except ValidationError as error:

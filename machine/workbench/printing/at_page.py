@@ -30,6 +30,10 @@ from profiles.profile import Profile
 LAST_WORD_S = 5.0  # a server that hangs is not waited for any longer
 LINES_KEPT = 100  # of the program's messages
 BEGIN, LEAVE = "begin", "leave"  # LEAVE: a print on a server continues without this program
+BEFORE_LIVE = {PrintState.CHECKING: "checking …", PrintState.PRINTING: "starting", PrintState.CANCELLING: "ending"}
+IS_READY = "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
+IS_KEPT = "The server keeps the file; nothing prints before somebody starts it there."
+HEATERS_OFF = "The heaters go off, and what is printed stays as it is."
 ANSWERS = (BEGIN, LEAVE, Command.CANCEL, Command.EMERGENCY_STOP)  # to the question whether to begin
 
 
@@ -81,7 +85,36 @@ class JobState:
         page shows their age."""
         values = {each.name: getattr(self, each.name) for each in fields(self) if each.name != "status"}
         checks = [{"text": check.text, "forced": check.forced} for check in self.checks]
-        return self.status.json() | values | {"checks": checks, "heat_s": self.told_s - self.status.heat_age_s}
+        heat_s = self.told_s - self.status.heat_age_s
+        return self.status.json() | values | {"checks": checks, "heat_s": heat_s, "how": self.how, "texts": self.texts()}
+
+    @property
+    def how(self) -> str:
+        """How the print is, or how it has ended."""
+        if self.state.is_over:
+            return self.sentence
+        if self.live:
+            return self.status.in_words()
+        if self.state is PrintState.UPLOADING:
+            return self.status.message or "handing the file over"
+        if self.state is PrintState.READY:
+            return "ready to print" if self.starts else "ready to be handed over"
+        return BEFORE_LIVE.get(self.state, f"{self.state}")
+
+    def texts(self) -> dict[str, str]:
+        """Texts of a page by the ids of its elements."""
+        port = "the simulated printer" if self.port == "sim" else self.port
+        state = ": ".join(filter(None, (self.state, self.status.warning)))
+        ends = "The server ends it, as its own macros say." if self.server else HEATERS_OFF
+        return {
+            "run-title": f"{'the rest of ' * bool(self.resumes)}{self.name} at {port}",
+            "run-news": f"{self.name}: {self.sentence if self.state.is_over else state}",  # a reader need not hear every per cent
+            "ask-told": self.question or (IS_READY if self.starts else IS_KEPT),
+            "begin": "Yes, go on" if self.resumes else "Print now" if self.starts else "Hand it over",
+            "leave": "No, leave it" if self.resumes else "Not now",
+            "pause": "Resume" if self.state.is_away else "Pause",
+            "sure-told": f"Cancel this print? {ends}",
+        }
 
 
 def first_state(job: PrintJob) -> JobState:

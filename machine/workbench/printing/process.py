@@ -21,7 +21,7 @@ from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
 from machine.printing.printers import check_print, open_printer, open_server_printer
 from machine.printing.resumption import print_rest, read_resumption, rest_of
 from machine.printing.server_print import ServerPrinter, file_name, running_print
-from machine.quantities import filament_g, price_in_words
+from machine.quantities import duration, filament_g, price_in_words
 from machine.workbench.printing.at_hand import by_hand
 from machine.workbench.printing.at_page import AtPage, StateReporter, first_state
 from mdp.kernels.workers import listen, read_frames, take_pipes
@@ -107,15 +107,12 @@ def _webcam(printer: ServerPrinter) -> str:
 
 
 def figures(loaded: LoadedProgram) -> dict[str, Any]:
-    """Figures of a program for the user: time, filament, price, findings."""
+    """A program's figures in words, and its findings."""
     program, material = loaded.program, loaded.profile.material
-    values, findings = summary(program.run), program.run.findings
-    return {
-        "time_s": values["time_s"],
-        "filament_mm": values["filament_mm"],
-        "filament_g": filament_g(values["filament_mm"], material),
-        "costs": price_in_words(values["filament_mm"], material),
-        "lines": len(program.lines),
-        "findings": [f"{finding.severity}: {finding.message}" for finding in findings[:MOST_FINDINGS]],
-        "errors": len(program.run.errors),
-    }
+    values, findings, errors = summary(program.run), program.run.findings, len(program.run.errors)
+    mm = values["filament_mm"]
+    weight = ", ".join(filter(None, (f"{filament_g(mm, material):.1f} g", price_in_words(mm, material))))
+    text = f"{len(program.lines)} lines, {duration(values['time_s'])}, {mm / 1000.0:.2f} m ({weight}) of filament"
+    if errors:
+        text += f", {errors} error{'s' * (errors > 1)} in the dry run"
+    return {"text": text, "findings": [f"{finding.severity}: {finding.message}" for finding in findings[:MOST_FINDINGS]]}

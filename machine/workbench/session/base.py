@@ -13,7 +13,9 @@ from machine.crash import bug_in_words
 from machine.workbench.bench.bench import Bench, History, Step
 from machine.workbench.work.folders import Received
 from machine.workbench.work.worker_pool import CLOSED, TaskQueue, WorkerPools
+from profiles.effect import effect_of_change
 from profiles.errors import UserError
+from profiles.frozen import Effect
 from profiles.messages import terminal_words
 
 WAITING = "waiting until the work of other benches is done"
@@ -78,6 +80,7 @@ class SessionBase(Observable):
         self.turn = asyncio.Lock()  # fair: first come, first served
         self.received = Received()
         self._files = count(1)
+        self._others = bench.profile, self.new_file()
         self._tasks: set[asyncio.Task[None]] = set()
 
     @property
@@ -92,6 +95,15 @@ class SessionBase(Observable):
     def new_file(self) -> Path:
         """A path for a task's output, deleted with the session at the latest."""
         return self.received.path / f"made-{next(self._files)}"
+
+    def others_of(self, bench: Bench) -> Path:
+        """The file for the parts of the other models on the plate (see work.plate); a new one after a change of the profile that
+        may lead to other parts."""
+        profile, file = self._others
+        if effect_of_change(profile, bench.profile) > Effect.NONE:
+            file.unlink(missing_ok=True)
+            self._others = bench.profile, self.new_file()
+        return self._others[1]
 
     def start(self, work: Coroutine[Any, Any, None], ask: object = None) -> "asyncio.Task[None]":
         """Start work in the background; its error becomes the sentence that pages show. ask: name of its command."""

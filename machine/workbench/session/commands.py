@@ -123,6 +123,7 @@ ACTS: dict[str, Callable[..., Any]] = {
     "unit": Session.open_in_unit,
     "plate": Session.open_plate,
     "close_gcode": Session.close_gcode,
+    "add_opened": Session.add_opened,
 }
 FUNCTIONS: dict[str, Callable[..., Any]] = {name: change for name, (change, _) in CHANGES.items()} | EDITS | MARKINGS | ACTS
 COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()}

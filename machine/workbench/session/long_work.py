@@ -162,11 +162,13 @@ class Slicing(Derived[Slices]):
             walls.update(so_far.walls)
             tell(replace(so_far, walls=walls))
 
-        files = self._session.new_file(), self._session.new_file()
+        files = self._session.others_of(bench), self._session.new_file(), self._session.new_file()
         sliced = await self._session.long.run(slice_bench, bench, *files, tell=follow)
         if self.done is not None:
             self.done.sliced.page.unlink(missing_ok=True)
             self.done.sliced.gcode.unlink(missing_ok=True)
+        if bench.beside:
+            self._session.become(self._session.history)  # the other models stand as they are cut now
         return Slices(bench, number, sliced, walls)
 
 
@@ -178,7 +180,7 @@ class Comparing(Derived[tuple[Alternative, ...]]):
         super().__init__(
             session,
             lambda bench: None if (slices := slicing.latest()) is None else slices.bench.printed,
-            lambda bench: session.long.run(compare_bench, bench, tell=self.teller()),
+            lambda bench: session.long.run(compare_bench, bench, session.others_of(bench), tell=self.teller()),
             by_itself=False,
             interrupts=True,
         )

@@ -6,6 +6,7 @@ from hashlib import sha256
 from itertools import count
 from math import hypot, inf
 from typing import Any
+from weakref import finalize
 
 from machine.workbench.bench.bench import Bench, with_cuts, with_zones
 from machine.workbench.bench.changes import Cuts, Edit, check_unlocked, planned_part, snap
@@ -20,6 +21,7 @@ from mdp.search.trial import Obstacle, Trial
 from mdp.zone import Zones
 from profiles.effect import effect_of_change
 from profiles.errors import MeshError, PlanError
+from profiles.files import modified_s
 from profiles.frozen import Effect
 
 REST_S = 0.1  # pause in dragging after which the planes are tried more closely
@@ -75,22 +77,27 @@ def standing_of(session: SessionBase) -> Derived[Standing]:
     """The placement of the model on the bench."""
 
     async def find(bench: Bench) -> Standing:
-        standing = await session.hand.run(stand, bench)
+        drawn = session.new_file()
+        standing = await session.hand.run(stand, bench, session.others_of(bench), drawn)
+        finalize(standing, drawn.unlink, missing_ok=True)
         if standing.refusal:
             session.refuse(MeshError(standing.refusal))
         return standing
 
-    return Derived(session, _stands_by, find)
+    return Derived(session, lambda bench: _stands_by(session, bench), find)
 
 
-def _stands_by(bench: Bench) -> tuple[object, ...] | None:
+def _stands_by(session: SessionBase, bench: Bench) -> tuple[object, ...] | None:
     """Everything that determines the placement and its report; None without a model."""
     if bench.model is None:
         return None
     process = bench.profile.of_part(1).process
     decides = process.self_supporting_angle_deg, process.line_width_mm, process.place_mm, bench.profile.machine
-    copies = (bench.copies, bench.cuts, bench.zones, bench.profile) if bench.copies > 1 else ()
-    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides, copies
+    several = bench.copies > 1 or bool(bench.beside)
+    plate = (bench.copies, bench.beside, bench.cuts, bench.zones, bench.profile) if several else ()
+    others = session.others_of(bench) if bench.beside else None
+    cut_at_s = modified_s(others) if others is not None and others.exists() else 0.0
+    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides, plate, cut_at_s
 
 
 def pedestal_key(bench: Bench, standing: Standing | None) -> str:

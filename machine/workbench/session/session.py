@@ -17,6 +17,7 @@ from machine.workbench.bench.bench import (
     History,
     Step,
     emptied,
+    with_beside,
     with_model,
     with_model_turned_as_read,
     with_plan,
@@ -77,6 +78,8 @@ class Session(SessionBase):
         self.keeping = Keeping(self)
         self.benches: list[dict[str, Any]] = []
         self.unscaled: OfUnknownUnit | None = None
+        self._opened: tuple[Bench, Bench] | None = None  # before and after a model was opened over another one
+        self.followers.append(self._forget_opened)
         self.gcode: Sliced | None = None  # a file that a page has sent
         self.settings_note = ("", "")
         self._to_begin: dict[object, str] = {}  # names of queued commands that begin long work
@@ -115,10 +118,39 @@ class Session(SessionBase):
         self.readiness.load()
         if self.bench.model is not None and self.bench.model.faces > MANY_FACES:
             self.resting.stop()  # the new model would wait for it
+        before = self.bench
         with self.waiting(f"reading {name}"):
-            bench = for_another_model(self.bench) if anew else self.bench
+            bench = for_another_model(before) if anew else before
             model = await self._read(path, name, bench.profile, plate, asks=True)
         await self._replace(f"open {name}", with_model(bench, model))
+        self._opened = (before, self.bench) if before.model is not None else None
+
+    def _forget_opened(self) -> None:
+        """Forget which model was opened over another one as soon as the bench is changed."""
+        if self._opened is not None and self._opened[1] is not self.bench:
+            self._opened = None
+
+    @property
+    def addable(self) -> str:
+        """Name of the model that has just been opened over another one, beside which it can be put; "" if there is none."""
+        model = None if self._opened is None else self.bench.model
+        return "" if model is None else model.name
+
+    async def add_opened(self) -> None:
+        """Put the model that has just been opened beside the previous one, and that on the bench again. Raises UserError."""
+        model = self.bench.model
+        if self._opened is None or model is None:
+            raise PlanError("no model has just been opened over another one, so none can be put beside that")
+        await self._add(self._opened[0], model.path, model.name)
+
+    async def add_model(self, path: Path, name: str) -> None:
+        """Put the model of a file on the plate, beside that on the bench. Raises UserError."""
+        await self._add(self.bench, path, name)
+
+    async def _add(self, bench: Bench, path: Path, name: str) -> None:
+        with self.waiting(f"reading {name}"):
+            model = await self._read(path, name, bench.profile)
+        self.do(f"add {name} to the plate", with_beside(bench, (*bench.beside, (model, 1))))
 
     async def _replace(self, word: str, bench: Bench) -> None:
         """Take other work onto the bench, after what lies there is kept."""
@@ -177,9 +209,11 @@ class Session(SessionBase):
         """Open a model that ships with the program. Raises UserError for an unknown one."""
         if not name.startswith("demo:"):
             raise PlanError(f"{name}: only the models that ship with the program are opened by name; choose or drop a file")
+        before = self.bench
         await self.open_model(locate(name), name)
         if (plan := plan_beside(name)) is not None:
             await self.open_plan(plan)
+        self._opened = (before, self.bench) if before.model is not None else None
 
     async def open_project(
         self, path: Path, name: str, taken_over: Callable[[Project], Project] = lambda project: project
@@ -208,10 +242,9 @@ class Session(SessionBase):
         check_block(profile, "")
         plan = None if project.plan is None else _read_plan(project.plan)
         with self.waiting(f"reading {project.name}"):
-            path = locate(project.name) if project.model is None else self.received.new_file(project.name)
-            if project.model is not None:
-                await asyncio.to_thread(shutil.copyfile, project.model, path)
-            model = await self._read(path, project.name, profile, project.plate)
+            model = await self._read(await self._copy_of(project.name, project.model), project.name, profile, project.plate)
+            others = [(name, await self._copy_of(name, file), copies) for name, file, copies in project.beside]
+            beside = tuple([(await self._read(path, name, profile), copies) for name, path, copies in others])
             uncut = with_model(Bench(profile, given=project.given), model)
             bench = with_rotation(uncut, project.rotation)
             if plan is not None:
@@ -221,8 +254,16 @@ class Session(SessionBase):
                 bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
         bench = bench if project.parts else replace(bench, cuts=None)
         locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in project.locked)
-        bench = replace(bench, locked=locked, stops=project.stops, copies=project.copies)
+        bench = with_beside(replace(bench, locked=locked, stops=project.stops, copies=project.copies), beside)
         return with_prices(replace(bench, recommended=project.recommended), {}) if bench.rows else bench
+
+    async def _copy_of(self, name: str, model: Path | None) -> Path:
+        """A copy of a project's model file for the bench, or the file of a demo."""
+        if model is None:
+            return locate(name)
+        path = self.received.new_file(name)
+        await asyncio.to_thread(shutil.copyfile, model, path)
+        return path
 
     async def open_plan(self, path: Path) -> None:
         """Cut the model on the bench by a plan file. Raises UserError if it cannot be read, or is for another model."""
@@ -302,6 +343,8 @@ class Session(SessionBase):
         if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
             with self.waiting(f"reading {model.name}"):
                 model = await self._read(model.path, model.name, bench.profile, model.plate)
+                others = [(await self._read(other.path, other.name, bench.profile), copies) for other, copies in bench.beside]
+            bench = replace(bench, beside=tuple(others))
             if new.rotate_deg != old.rotate_deg:
                 turn = turned_by(new.rotate_deg) @ turned_by(old.rotate_deg).T
                 return with_model_turned_as_read(bench, model, turn, new.scale / old.scale), ""

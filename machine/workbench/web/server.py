@@ -161,10 +161,10 @@ def _demo_picture(name: str) -> str:
 
 
 def policy(style: str, script: str, lines: Iterable[str]) -> str:
-    """Content security policy: own script and style, images that the page creates, and connections to its server."""
+    """Content security policy: own script and style, images that the page creates, and images and connections of its server."""
     server = " ".join(("'self'", *lines))
     own = f"script-src {hash_source(script)}; style-src {hash_source(style)}; connect-src {server}"
-    rest = "frame-src 'self'; img-src data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    rest = "frame-src 'self'; img-src 'self' data: blob:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
     return f"default-src 'none'; {own}; {rest}"
 
 
@@ -261,6 +261,7 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("model/{key}", _of_key(_model_key, _model)),
         route("marks/{key}", _of_key(lambda session: marks_key(session.bench), _marks)),
         route("pedestal/{key}", _of_key(lambda session: pedestal_key(session.bench, session.standing.result), _pedestal)),
+        route("others/{key}", _of_key(_others_key, _others)),
         route("facets/{key}", _of_key(_model_key, _facets)),
         route("file", uploads.take, "POST"),
         route("left", uploads.list_left),
@@ -346,6 +347,18 @@ async def _model(session: Session, request: Request) -> Response:
 async def _pedestal(session: Session, request: Request) -> Response:
     assert session.standing.result is not None
     return Response(session.standing.result.pedestal, media_type=BYTES)
+
+
+def _others_key(session: Session) -> str:
+    standing = session.standing.result
+    return "" if standing is None else standing.others_key
+
+
+async def _others(session: Session, request: Request) -> Response:
+    standing = session.standing.result  # its file exists as long as it
+    assert standing is not None
+    assert standing.others is not None
+    return Response(await asyncio.to_thread(standing.others.read_bytes), media_type=BYTES)
 
 
 async def _facets(session: Session, request: Request) -> Response:

@@ -3,11 +3,13 @@
 from collections.abc import Sequence
 from dataclasses import asdict
 from hashlib import sha256
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from machine.dryrun.findings import Finding
+from machine.planning.stops import Stop
 from machine.program import Alternative
 from machine.quantities import about, duration, filament_g, newtons, percent, price_in_words
 from machine.view.parts import front_record, page_colours
@@ -16,6 +18,7 @@ from machine.workbench.bench.bench import Bench, Step
 from machine.workbench.bench.changes import Cuts
 from machine.workbench.bench.model import Model
 from machine.workbench.bench.page_words import page_words
+from machine.workbench.bench.settings import settings_of
 from machine.workbench.session.commands import Need, lacking
 from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session
@@ -27,6 +30,7 @@ from mdp.search.plan_file import ZONE_KINDS
 from mdp.zone import AnyZone, Brushed, MeshVolume, Modifier, Zone
 from profiles.material import Material
 from profiles.messages import advice, settings_in, terminal_words
+from profiles.places import OF_KIND
 from profiles.profile import Profile
 
 MOST_STEPS_LISTED = 30  # of those that can be undone, or done again
@@ -164,6 +168,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "note": session.note,
         "preparing": bool(session.readiness.progress),
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
+        "savable": _savable(session),
         "undo": terminal_words(history.now.word) if history.before else "",
         "redo": terminal_words(history.undone[-1].word) if history.undone else "",
         "steps": {"undo": _words((*history.before, history.now)[1:]), "redo": _words(history.undone)},
@@ -199,10 +204,13 @@ def snapshot(session: Session) -> dict[str, Any]:
         "given": asdict(bench.given),
         "part_settings": [{"part": own.part, "keys": list(own.process)} for own in bench.profile.parts],
         "priced": bench.priced,
-        "stops": [asdict(stop) for stop in bench.stops],
+        "stops": [_stop(stop) for stop in bench.stops],
         "copies": bench.copies,
         "copies_mm": standing and [[round(x, 3), round(y, 3)] for x, y in standing.copies_mm],
         "copies_told": _copies_told(session),
+        "beside": [{"name": other.name, "copies": copies} for other, copies in bench.beside],
+        "others": standing and standing.others_key,
+        "addable": session.addable,
         "place_mm": bench.profile.process.place_mm,
         "machine": machine_bodies(bench.profile.machine, known=True),
         "benches": session.benches,
@@ -210,6 +218,26 @@ def snapshot(session: Session) -> dict[str, Any]:
         "material": bench.profile.material.name,
         "process": bench.profile.process.name,
     }
+
+
+def _savable(session: Session) -> dict[str, tuple[str, str]]:
+    """Each kind of file that can be saved: why it cannot be ("" if it can), and its description."""
+    model, parts, slices = (lacking(session, need) for need in (Need.MODEL, Need.PARTS, Need.SLICES))
+    latest, given = session.slicing.latest(), session.bench.given
+    errors, compared = latest is not None and latest.sliced.errors, ", with the comparison" if session.comparing.rows() else ""
+    entries = {
+        "project": (model, "3MF with model, parts, marks and profiles, to open here or on another computer"),
+        "plan": (parts, "orientation and cuts, to open here again"),
+        "parts": (parts, "zip of an STL file for each part, a coloured 3MF and the plan"),
+        "pictures": (parts, "zip of PNGs: the parts, the print order, every number of parts"),
+        "gcode": (slices, "the dry run found errors: confirm before saving" if errors else "for the printer"),
+        "page": (slices, f"one HTML file that opens anywhere{compared}"),
+    }
+    for kind in OF_KIND:
+        name, count = Path(getattr(given, kind)).name, len(settings_of(given, kind))
+        changes = f"{count} change{'s' * (count != 1)}"
+        entries[kind] = ("" if count else f"no setting of {name} is changed", f"{name} with {changes}, to open here again")
+    return entries
 
 
 def _resting(session: Session) -> list[dict[str, Any]]:
@@ -230,9 +258,15 @@ def _words(steps: Sequence[Step]) -> list[str]:
     return [terminal_words(step.word) for step in steps[::-1][:MOST_STEPS_LISTED]]
 
 
+def _stop(stop: Stop) -> dict[str, str]:
+    """A pause in words."""
+    where = f"at {stop.height_mm or 0.0:.12g} mm" if stop.layer is None else f"before layer {stop.layer}"
+    return {"kind": "filament change" if stop.change else "pause", "where": f"part {stop.part}, {where}"}
+
+
 def _copies_told(session: Session) -> str:
-    """Sentence about how many copies are on the plate, or why they do not fit."""
-    standing, count = session.standing.result, session.bench.copies
+    """Sentence about how many models are on the plate, or why they do not fit."""
+    standing, count = session.standing.result, session.bench.copies + sum(copies for _, copies in session.bench.beside)
     if standing is None or count == 1:
         return ""
     return standing.copies_problem or f"All {count} stand on the plate."

@@ -60,7 +60,7 @@ class Uploads:
 
         if DEVICE in request.scope:
             check_model_name(name)
-        return await self._open(session, name, receive, DEVICE in request.scope)
+        return await self._open(session, name, receive, DEVICE in request.scope, "add" in request.query_params)
 
     async def list_left(self, session: Session, request: Request) -> Response:
         """The files left behind that still exist."""
@@ -103,7 +103,8 @@ class Uploads:
             except PlanError:
                 rows.append({"key": folder.name, "name": "", "parts": 0, "written_s": folder.stat().st_mtime})
             else:
-                rows.append({"key": folder.name, "name": project.name, "parts": project.parts, "written_s": project.written_s})
+                name = ", ".join(project.names)
+                rows.append({"key": folder.name, "name": name, "parts": project.parts, "written_s": project.written_s})
         return JSONResponse(rows)
 
     async def open_kept(self, session: Session, request: Request) -> Response:
@@ -149,19 +150,27 @@ class Uploads:
         return True
 
     async def _open(
-        self, session: Session, name: str, fill: Callable[[Path], Awaitable[object]], of_device: bool = False
+        self, session: Session, name: str, fill: Callable[[Path], Awaitable[object]], of_device: bool = False, add: bool = False
     ) -> Response:
+        """add: put a model beside that on the bench."""
         path, taken = session.received.new_file(name), False
         try:
             await fill(path)
 
             def taken_over(project: Project) -> Project:
                 if of_device:
-                    check_model_name(project.name)
+                    for model in project.names:
+                        check_model_name(model)
                 return self._with_copies(project)
 
             async with session.turn:
-                if is_project(path):
+                add = add and session.bench.model is not None and path.suffix.lower() != TEXT_SUFFIX
+                if add and (is_project(path) or path.suffix.lower() in GCODE_SUFFIXES):
+                    raise PlanError(f"{name} is a plate of its own, so it is opened alone: no model goes beside it")
+                if add:
+                    await session.add_model(path, name)
+                    taken = True
+                elif is_project(path):
                     await session.open_project(path, name, taken_over)
                 elif path.suffix.lower() in GCODE_SUFFIXES:
                     await session.open_gcode(path, name)

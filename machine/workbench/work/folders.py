@@ -20,6 +20,7 @@ from weakref import finalize
 from machine.pipeline.project import PLAN, Project, figures_of, write_folder
 from machine.pipeline.project_record import RECORD
 from machine.workbench.bench.bench import Bench, plan_of_bench
+from machine.workbench.bench.model import Model
 from mdp.model_file import DEMO
 from profiles.files import LOCK, keep_newest, lock_folder, modified_s, remove_locked
 from profiles.folders import state_folder
@@ -131,18 +132,24 @@ def work_of(bench: Bench) -> Project:
     assert model is not None
     return Project(
         name=model.name,
-        model=None if model.name.startswith(DEMO) else model.path,
+        model=_own_file(model),
         given=bench.given,
         rotation=bench.rotation,
         parts=bench.parts,
         locked=tuple(k for k, part in enumerate(bench.cuts or ()) if part in bench.locked),
         stops=bench.stops,
         copies=bench.copies,
+        beside=tuple((other.name, _own_file(other), copies) for other, copies in bench.beside),
         recommended=bench.recommended,
         plate=model.plate,
         marks_in_plan=True,
         figures=figures_of(next((row for row in bench.rows if row.parts == bench.parts), None)),
     )
+
+
+def _own_file(model: Model) -> Path | None:
+    """The file of a model, None for a demo."""
+    return None if model.name.startswith(DEMO) else model.path
 
 
 def folders_kept() -> list[Path]:

@@ -2,28 +2,25 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from machine.pipeline import compilers
 from machine.pipeline.embedded_profile import has_settings
-from machine.pipeline.plate import places_of
 from machine.pipeline.project import STANDING
 from machine.planning.fit import Place
-from machine.workbench.bench.bench import Bench, plan_of_bench
+from machine.workbench.bench.bench import Bench
 from machine.workbench.bench.changes import workpiece_mesh
 from machine.workbench.bench.model import Model, mesh_blocks
 from machine.workbench.bench.values import vector_of
-from machine.workbench.work.cutting import PLAN_NAME, cut_bench, out_of_reach, turned_mesh
-from mdp.decomposition import Decomposition
+from machine.workbench.work.cutting import out_of_reach, turned_mesh
+from machine.workbench.work.plate import places_on_plate
 from mdp.directions.orientation import in_words, resting_facets, side_in_words
 from mdp.kernels.workers import Tell
-from mdp.mesh import Mesh
 from mdp.overhang import Mask, risky_upright
 from mdp.pedestal import on_pedestal, pedestal_under
-from mdp.ranking.ranker import CLASSIC
 from mdp.read import SizeError
 from mdp.read import read_model as read_model_file
 from mdp.search.orient import distinct_orientations
@@ -124,8 +121,9 @@ class Standing:
     """Placement of a model. size_mm: along the plate's axes, without the pedestal; overhang_mm2: area that overhangs too far, off
     the plate; problem: why the machine cannot reach it in one piece, in the words of `export`, "" if it can; pedestal: in the
     format of `mesh_blocks`, b"": there is none; refusal: why a wanted pedestal is impossible; copies_mm: x, y of the copies'
-    centres relative to its place, the nearest first, (0, 0) alone if they do not fit; copies_problem: why they do not fit, "":
-    they do."""
+    centres relative to its place, the nearest first, (0, 0) alone if they do not fit; copies_problem: why all models of the plate
+    do not fit, "": they do; others, others_key: file of the other models' triangles, in the format of `mesh_blocks`, from its
+    place, and their key, "" if there are none."""
 
     size_mm: Vector
     overhang_mm2: float
@@ -134,10 +132,12 @@ class Standing:
     refusal: str = ""
     copies_mm: tuple[Place, ...] = (MIDDLE,)
     copies_problem: str = ""
+    others: Path | None = None
+    others_key: str = ""
 
 
-def stand(tell: Tell, bench: Bench) -> Standing:
-    """The placement of the model on the bench."""
+def stand(tell: Tell, bench: Bench, others: Path, drawn: Path) -> Standing:
+    """The placement of the model on the bench. others: the file of the other models' parts; drawn: that of their triangles."""
     mesh, profile, pedestal, refusal = turned_mesh(bench), bench.profile, b"", ""
     size_mm = vector_of(np.ptp(mesh.bounds_mm, axis=0))
     height_mm = profile.search.pedestal_mm
@@ -149,21 +149,11 @@ def stand(tell: Tell, bench: Bench) -> Standing:
             pedestal, refusal = b"", f"{error}"
     risky = risky_upright(mesh, profile.process.self_supporting_angle_deg)
     problem = out_of_reach((one_piece(mesh, profile.machine),), profile)
-    copies_mm, none = _copies(mesh, bench)
-    return Standing(size_mm, float(mesh.areas_mm2[risky].sum()), problem, pedestal, refusal, copies_mm, none)
-
-
-def _copies(mesh: Mesh, bench: Bench) -> tuple[tuple[Place, ...], str]:
-    """The positions of the copies, and why they do not fit."""
-    if bench.copies == 1 or bench.model is None:
-        return (MIDDLE,), ""
-    machine, (x, y) = bench.profile.machine, bench.profile.process.place_mm
+    standing = Standing(size_mm, float(mesh.areas_mm2[risky].sum()), problem, pedestal, refusal)
+    if bench.copies == 1 and not bench.beside:
+        return standing
     try:
-        if bench.parts > 1:
-            printed = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
-        else:
-            printed = Decomposition(bench.model.name, mesh, (one_piece(mesh, machine),), 1, CLASSIC, 0.0, 0.0, 0, 0, 0.0)
-        places, _ = places_of([printed] * bench.copies, bench.profile)
-    except PlanError as error:
-        return (MIDDLE,), f"{error}"
-    return tuple((at_x - x, at_y - y) for at_x, at_y in places), ""
+        copies_mm, key = places_on_plate(mesh, bench, others, drawn)
+    except (MeshError, PlanError) as error:
+        return replace(standing, copies_problem=f"{error}")
+    return replace(standing, copies_mm=copies_mm, others=drawn, others_key=key)

@@ -9,22 +9,19 @@ import numpy as np
 
 from machine.dryrun.dryrun import summary
 from machine.dryrun.findings import Finding, KnownFindings, errors_of, known_findings
-from machine.pipeline.choice import as_turned
 from machine.pipeline.comparison import in_one_part, in_parts
 from machine.pipeline.pipeline import build
-from machine.pipeline.plate import on_one_plate
 from machine.pipeline.programs import load_program
 from machine.pipeline.requests import ModelRequest
 from machine.planning.fit import standing_at
 from machine.program import Alternative
 from machine.view.page import print_page, with_comparison
-from machine.workbench.bench.bench import Bench, plan_of_bench
-from machine.workbench.work.cutting import PLAN_NAME, cut_bench
-from mdp.decomposition import Decomposition, Part
+from machine.workbench.bench.bench import Bench
+from machine.workbench.work.plate import plated
+from mdp.decomposition import Part
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats
 from profiles.errors import GcodeError
-from profiles.profile import Profile
 from slicer.paths import Kind, Layer, SlicedPart
 from slicer.slice import SlicingProgress
 
@@ -96,10 +93,10 @@ class Sliced:
         return errors_of(self.findings)
 
 
-def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
+def slice_bench(tell: Tell, bench: Bench, others: Path, page: Path, gcode: Path) -> Sliced:
     """Slice the bench, write page and G-code to these files and dry-run them, as `export --plan` does with pauses and copies; an
-    uncut model in one piece."""
-    decomposition, profile = _plated(bench)
+    uncut model in one piece. others: see work.plate."""
+    decomposition, profile = plated(bench, others, lambda text: tell(SlicesSoFar(text)))
     standing = standing_at(decomposition, profile.process.place_mm)
     shares: tuple[float, ...] = ()
     ready: set[int] = set()
@@ -155,7 +152,7 @@ def open_gcode(tell: Tell, request: ModelRequest, page: Path, gcode: Path) -> Sl
     return Sliced(
         page,
         gcode,
-        sha256(drawn + content).hexdigest()[:16],  # the page, too: a file may be opened again for another machine
+        sha256(drawn + content).hexdigest()[:16],  # a file may be tried again, for another machine
         values["time_s"],
         values["filament_mm"],
         known_findings(program.lines, profile, program.run.findings),
@@ -163,18 +160,12 @@ def open_gcode(tell: Tell, request: ModelRequest, page: Path, gcode: Path) -> Sl
     )
 
 
-def compare_bench(tell: Tell, bench: Bench) -> tuple[Alternative, ...]:
-    """Costs of the model on the bench in one piece, as it stands and in its best orientation, as in `export --compare`."""
-    decomposition, profile = _plated(bench)
+def compare_bench(tell: Tell, bench: Bench, others: Path) -> tuple[Alternative, ...]:
+    """Costs of the models on the plate in one piece, as they stand and in their best orientations, as in `export --compare`."""
+    decomposition, profile = plated(bench, others, tell)
     return in_one_part(decomposition, profile, lambda text, share=None: tell(text))
 
 
 def share_page(tell: Tell, page: Path, alternatives: tuple[Alternative, ...], out: Path) -> None:
     """Write the page of slices with the costs of alternatives."""
     out.write_bytes(with_comparison(page.read_bytes(), alternatives))
-
-
-def _plated(bench: Bench) -> tuple[Decomposition, Profile]:
-    """The parts on the bench with its copies, as for `export --copies`, and the profile to print them with."""
-    cut = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
-    return on_one_plate([cut] * bench.copies, as_turned(bench.profile, bench.turned))

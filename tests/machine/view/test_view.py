@@ -278,6 +278,7 @@ def test_what_is_kept_stays_exact(monkeypatch: pytest.MonkeyPatch) -> None:
     header, columns = read(WAVE)
     rows = np.searchsorted(program.line, columns["line"])
     assert header["thinned"] == {"rows": len(program.line), "kept": len(rows)}
+    assert header["summary"].endswith(f" m of filament · thinned: {len(rows):,} of {len(program.line):,} moves")
     np.testing.assert_allclose(columns["end"], program.end[rows], atol=0.00051)
     np.testing.assert_allclose(columns["filament"], program.filament_mm[rows], atol=1e-5)
     assert columns["time"][-1] == pytest.approx(header["time_s"], abs=0.001)

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from machine.workbench.bench.bench import Bench
+from machine.workbench.bench.changes import MARKINGS
 from machine.workbench.bench.values import read_command
 from machine.workbench.printing.commands import COMMANDS as OF_PRINTS
 from machine.workbench.session.commands import COMMANDS, obey, perform
@@ -27,6 +28,7 @@ ANYTHING = {
     "plate": 1,
     "key": "",
     "at": "",
+    "faces": "0",
     "axis": "x",
     "deg": 0,
     "offset_mm": 0,
@@ -35,11 +37,10 @@ ANYTHING = {
     "kind": "pause",
     "min_mm": [0, 0, 0],
     "max_mm": [1, 1, 1],
-    "faces": "",
 }
 WITHOUT_A_MODEL = {"close_gcode", "demo", "undo", "redo", "set", "reset", "profile", "stop", "dismiss", "unit"}
 UNSLICED = "what is on the workbench is not sliced yet: slice it first"
-DOCS = Path(__file__).parents[3] / "docs" / "workbench.md"
+DOCS = Path(__file__).parents[3] / "docs" / "workbench-protocol.md"
 PAGE = resources.files("machine.workbench.web").joinpath("page")
 
 
@@ -50,11 +51,9 @@ def bare(bench: Bench) -> Any:
 
 @pytest.mark.parametrize("name", sorted({*COMMANDS} - WITHOUT_A_MODEL))
 def test_all_that_is_done_to_a_model_is_refused_without_one(name: str) -> None:
+    kind = {"kind": "keep"} if name in MARKINGS else {}
     with pytest.raises(PlanError, match="there is no model on the workbench yet: choose a file first"):
-        perform(
-            bare(Bench(load())),
-            *read_command({"do": name, **ANYTHING, **({"kind": "keep"} if "mark" in name or name == "brush" else {})}, COMMANDS),
-        )
+        perform(bare(Bench(load())), *read_command({"do": name, **ANYTHING, **kind}, COMMANDS))
 
 
 def test_only_what_is_sliced_is_compared() -> None:
@@ -64,7 +63,7 @@ def test_only_what_is_sliced_is_compared() -> None:
 
 @pytest.mark.parametrize("name", ["dance", ["turn"], None, "refuse"])
 def test_what_is_no_command_is_told_to_be_none(name: Any) -> None:
-    with pytest.raises(PlanError, match=r"no command: docs/workbench.md lists them"):
+    with pytest.raises(PlanError, match=r"no command: docs/workbench-protocol.md lists them"):
         obey(bare(Bench(load(), model())), {"do": name})
 
 
@@ -104,5 +103,5 @@ def test_the_page_sends_with_a_command_what_it_has_and_all_that_it_needs() -> No
 
 
 def test_the_documentation_lists_every_command_and_no_other() -> None:
-    rows = re.findall(r"^\| (`[^|]*) \|", DOCS.read_text("utf-8").partition("Below `/TOKEN/N/`")[2], re.MULTILINE)
+    rows = re.findall(r"^\| (`[^|]*) \|", DOCS.read_text("utf-8").partition("## Routes")[0], re.MULTILINE)
     assert {name for row in rows for name in re.findall(r"`(\w+)`", row)} == {*COMMANDS, *OF_PRINTS}

@@ -3,7 +3,7 @@
 import asyncio
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
-from types import SimpleNamespace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -11,6 +11,7 @@ import pytest
 from machine.workbench.bench.bench import Bench, Step
 from machine.workbench.session.base import Derived, SessionBase
 from machine.workbench.session.planes import standing_of
+from machine.workbench.work.models import Standing
 from machine.workbench.work.worker_pool import WorkerPools
 from profiles.errors import PlanError, UserError
 from profiles.profile import load
@@ -205,9 +206,9 @@ def test_how_copies_stand_is_worked_out_again_for_what_decides_their_places(sett
         bench, stood = Bench(PROFILE, model=model(), copies=3), list[Bench]()
         session = SessionBase(bench, WorkerPools())
 
-        async def run(task: Any, standing: Bench) -> SimpleNamespace:
+        async def run(task: Any, standing: Bench, *files: Path) -> Standing:
             stood.append(standing)
-            return SimpleNamespace(refusal="")
+            return Standing((40.0, 10.0, 40.0), 0.0, "")
 
         session.hand.run = run  # type: ignore[assignment, method-assign]
         standing_of(session)

@@ -17,7 +17,7 @@ from threading import Event
 import pytest
 
 from machine.pipeline.project import read_folder
-from machine.pipeline.project_record import RECORD
+from machine.pipeline.project_record import RECORD, VERSION
 from machine.pipeline.requests import Given
 from machine.planning.stops import parse_stops
 from machine.workbench.bench.bench import Bench
@@ -105,7 +105,7 @@ def test_profiles_that_are_files_are_kept_with_their_names(bench: Bench, tmp_pat
 def test_work_of_a_newer_version_is_refused_and_stays(bench: Bench) -> None:
     folder = new_folder()
     write_work(folder, bench)
-    (folder / RECORD).write_text(json.dumps({"version": 2}))
+    (folder / RECORD).write_text(json.dumps({"version": VERSION + 1}))
     with pytest.raises(PlanError, match="kept by a newer tiltprint, which can open it; it stays in"):
         read_folder(folder)
     (folder / RECORD).write_text('{"version": 1, "name"')

@@ -7,6 +7,7 @@ import weakref
 import zipfile
 from dataclasses import replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import manifold3d as m3
@@ -189,7 +190,13 @@ def test_what_a_slicer_file_marks_lies_on_the_bench_boxes_and_other_shapes_too(t
 def standing(mesh: Mesh, turns_deg: tuple[float, float, float] = (0.0, 0.0, 0.0), **settings: Any) -> Standing:
     profile = load(settings=[f"{key.replace('__', '.')}={value}" for key, value in settings.items()])
     bench = replace(with_model(Bench(profile), model(mesh=mesh)), rotation=turned_by(turns_deg).tolist())
-    return stand(lambda report: None, bench)
+    return placed(bench)
+
+
+def placed(bench: Bench) -> Standing:
+    """The placement of what is on a bench, with its files in a folder that is gone then."""
+    with TemporaryDirectory() as folder:
+        return stand(lambda report: None, bench, Path(folder) / "others", Path(folder) / "drawn")
 
 
 # A tee is 10 mm thick: its bar of 40 mm hangs over its stem by 15 mm at each side, and seen along its thickness it has 700 mm2.
@@ -216,13 +223,13 @@ def test_what_is_larger_than_the_machine_reaches_is_told_in_the_sentence_of_expo
 
 def test_copies_stand_beside_the_model_in_parts_too_and_what_has_no_room_is_told_in_the_sentence_of_export() -> None:
     bench = replace(with_model(Bench(load(settings=["process.place_mm=[10, 5]"])), model(mesh=tee())), copies=3)
-    stood = stand(lambda report: None, bench)
+    stood = placed(bench)
     assert (len(stood.copies_mm), stood.copies_mm[0], stood.copies_problem) == (3, (0.0, 0.0), "")
-    crowd = stand(lambda report: None, replace(bench, copies=500))
+    crowd = placed(replace(bench, copies=500))
     assert crowd.copies_mm == ((0.0, 0.0),)
     assert crowd.copies_problem.startswith("500 copies: ")
     cut = replace(bench, cuts=(PlannedPart((0.0, 0.0, 1.0), 20.0),))
-    apart = stand(lambda report: None, cut)
+    apart = placed(cut)
     assert (len(apart.copies_mm), apart.copies_problem) == (3, "")
 
 

@@ -55,13 +55,23 @@ def test_temperatures_of_ten_minutes_are_lines_with_the_newest_at_the_right_edge
 
 
 @needs_node
-def test_a_warning_stands_beside_the_state_on_the_tab_and_in_the_bar_of_every_tab() -> None:
-    lost = "this print can no longer be resumed"
+def test_how_a_print_is_stands_on_the_tab_and_in_the_bar_of_every_tab() -> None:
     told = on_fake_page(
-        f"{PAGE} tell('printing', 0.5, {{ warning: '{lost}' }});"
+        f"{PAGE} tell('printing', 0.5, {{ how: 'printing, 50 %', texts: {{ 'run-news': 'box: printing' }} }});"
         " return ['run-state', 'bar-told', 'run-news'].map((id) => $(id).textContent);"
     )
-    assert told == [f"printing, 50 % · {lost}", f"box at sim: printing, 50 % · {lost}", f"box: printing: {lost}"]
+    assert told == ["printing, 50 %", "box at sim: printing, 50 %", "box: printing"]
+
+
+@needs_node
+def test_a_camera_is_looked_at_every_two_seconds_until_its_print_is_over() -> None:
+    act = f"""{PAGE} tell('printing', 0.5, {{ webcam: true }});
+        Object.assign($('webcam'), {{ complete: true }}); fake.wait(2000);
+        const asked = $('webcam').src.split('?')[0]; $('webcam').onload();
+        const seen = [asked, $('webcam-line').hidden];
+        tell('done', 1, {{ webcam: true, is_over: true }}); fake.wait(2000);
+        return [...seen, $('webcam-line').hidden];"""
+    assert on_fake_page(act) == ["prints/1/webcam", False, True]
 
 
 @needs_node

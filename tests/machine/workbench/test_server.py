@@ -328,7 +328,7 @@ def test_copies_and_pauses_are_the_command_line_s_and_their_sentences_name_field
         page.do("add_stop", kind="pause", at="1:2.4mm")
         page.do("slice")
         sliced = page.until(lambda state: state["sliced"] and not state["slicing"])
-        assert [stop["change"] for stop in sliced["stops"]] == [False, True]
+        assert [stop["kind"] for stop in sliced["stops"]] == ["pause", "filament change"]
         command = json.loads(bench.ask("settings.json?part=0")[1])["command"]
         assert command.endswith(" --parts 1 --as-is --copies 2 --pause 1:2.4mm --filament-change 1:3 -o box.gcode")
         assert main(split(command)[1:]) == 0

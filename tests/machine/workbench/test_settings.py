@@ -50,12 +50,12 @@ def test_a_number_has_its_meaning_and_its_range() -> None:
         0.2,
         False,
     )
-    assert height["meaning"] == "height of a layer, mm"
+    assert height["meaning"] == "Height of a layer, mm (0.02 to 2)."
 
 
 def test_a_share_is_shown_as_a_percentage_and_its_key_stays_a_share() -> None:
     density = described("process.infill_density", with_setting(USUAL, "process.infill_density", "7%"))
-    assert [density[word] for word in ("unit", "value", "unchanged", "least", "most")] == ["%", 7.0, 20.0, 0.0, 100.0]
+    assert [density[word] for word in ("unit", "value", "was", "least", "most")] == ["%", 7.0, "Profile value: 20 %", 0.0, 100.0]
     assert profile_as_given(with_setting(USUAL, "process.infill_density", "7%"), load()).process.infill_density == 0.07
     assert described("material.fan_bridge")["value"] is None
 

@@ -1,7 +1,7 @@
 // Colours: what the beads are coloured by, and the legend of each.
 
 import { clamp, mix } from "../picture/math.js";
-import { PLAIN, rgb, wordOf } from "../picture/solids.js";
+import { PLAIN, rgb, wordOf } from "../picture/shapes.js";
 import { KIND } from "./rows.js";
 
 const TYPES = [
@@ -41,7 +41,7 @@ function spread(rows, value) {
 /** Colours of all slots for a mode, hidden types left out (alpha 0), and the legend: entries or a scale. */
 export function coloured(mode, rows, path, extra) {
   const colours = new Uint32Array(path.texels);
-  const { colour, legend } = mode in SCALES ? scaleOf(mode, rows, extra) : (mode === "kind" ? typesOf : partsOf)(rows, extra);
+  const { colour, legend } = mode in SCALES ? scaleOf(mode, rows, extra) : ownOf(mode, rows, extra);
   const jumps = rows.jumpRow.length > 1;
   for (let i = 0; i < rows.count; i++) {
     if (rows.kind[i] !== KIND.extrude || extra.hidden.has(rows.type[i])) continue;
@@ -60,13 +60,10 @@ function scaleOf(mode, rows, extra) {
   return { colour, legend: { unit, marks } };
 }
 
-function typesOf(rows) {
-  const words = rows.types.map((name) => wordOf(rgb(typeColour(name))));
-  return { colour: (i) => words[rows.type[i]], legend: null };
-}
-
-function partsOf(rows, { parts }) {
-  const words = new Uint32Array(Math.max(0, ...parts.map(({ index }) => index)) + 1).fill(wordOf(rgb(PLAIN)));
-  parts.forEach(({ index, colour }) => { words[index] = wordOf(rgb(colour)); });
-  return { colour: (i) => words[rows.part[i]], legend: null };
+/** Every kind of line, or every part, in its own colour. */
+function ownOf(mode, rows, { parts }) {
+  const [column, own] = mode === "kind" ? [rows.type, rows.types.map((name, k) => [k, typeColour(name)])] : [rows.part, parts.map(({ index, colour }) => [index, colour])];
+  const words = new Uint32Array(Math.max(0, ...own.map(([k]) => k)) + 1).fill(wordOf(rgb(PLAIN)));
+  own.forEach(([k, colour]) => { words[k] = wordOf(rgb(colour)); });
+  return { colour: (i) => words[column[i]], legend: null };
 }

@@ -1,7 +1,111 @@
 // Pace: a picture only after a change; where the whole takes long, a coarse one at once and the whole piece by piece when all rests.
+// The coarse one has far fewer beads, for the eye while it moves: of what is seen from outside every k-th layer, as high as k of them, and
+// straight pieces instead of fine curves. Where the file does not tell what is seen from outside, of all kinds of line.
 
 import { notice } from "../elements.js";
-import { clamp } from "../picture/math.js";
+import { clamp, countUpTo } from "../picture/math.js";
+import { KIND, layerOf, TEXELS } from "./rows.js";
+import { PLAIN_TINT } from "./scene.js";
+
+const SEEN_OUTSIDE = /external perimeter|outer wall|wall-outer|overhang|bridge|top|bottom|solid|skin|support|skirt|brim|raft|ironing|custom/i;
+const TOPS = /top|ironing/i; // they close the model whatever layer they lie in
+const BEND_MM = 0.04; // by which a coarse bead may leave the path, a layer
+const AT_MOST = 12; // rows in one bead
+
+/** A path as beadsOf draws it, {slots, texels, points, sizes, verticals}, and of each slot the rows that it stands for, from first to
+ * last: the last ones rise. Slots of no size lie between strokes. */
+export function coarseOf(rows, path, k) {
+  const kept = keptRows(rows, k), bend = (k * BEND_MM) ** 2, points = [], first = [], last = [];
+  let slot = -1;
+  const place = (s) => { for (let axis = 3 * s; axis < 3 * s + 3; axis++) points.push(path.points[axis]); };
+  const bead = (from, to, end) => { first.push(from); last.push(to); place(end); };
+  for (let row = 0; row < rows.count; row++) {
+    if (!kept[row]) continue;
+    const begin = path.slot(row);
+    if (begin !== slot || !points.length) {
+      if (points.length) bead(-1, last[last.length - 1], begin); // the way to the next stroke
+      else place(begin);
+    }
+    let end = row;
+    slot = begin + 1;
+    while (end - row < AT_MOST && goesOn(rows, path, kept, end, slot) && straight(path.points, begin, slot + 1, bend)) {
+      end++;
+      slot++;
+    }
+    bead(row, end, slot);
+    row = end;
+  }
+  return coarsePath(rows, path, k, points, Int32Array.from(first), Int32Array.from(last));
+}
+
+/** Which rows are drawn at all. */
+function keptRows(rows, k) {
+  const outside = rows.types.map((name) => SEEN_OUTSIDE.test(name)), tops = rows.types.map((name) => TOPS.test(name));
+  const told = outside.some(Boolean), kept = new Uint8Array(rows.count), ends = new Set();
+  rows.layers.forEach((layer, i) => { if (layer.part !== rows.layers[i + 1]?.part) ends.add(i); });
+  const keep = (from, to, all) => {
+    for (let i = from; i < to; i++)
+      kept[i] = rows.kind[i] === KIND.extrude && rows.width[i] && (!told || (all && outside[rows.type[i]]) || tops[rows.type[i]]) ? 1 : 0;
+  };
+  if (!rows.layers.length) keep(0, rows.count, true);
+  rows.layers.forEach((layer, i) => keep(layer.first, layer.last + 1, layer.number % k === 0 || layer.number === 1 || ends.has(i)));
+  return kept;
+}
+
+/** Whether the row after one is the same bead going on, and lies where that ends. */
+function goesOn(rows, path, kept, row, slot) {
+  const next = row + 1;
+  return next < rows.count && kept[next] && rows.type[next] === rows.type[row] && rows.part[next] === rows.part[row] && path.slot(next) === slot;
+}
+
+/** Whether all points between two lie near the straight way from one to the other. */
+function straight(p, from, to, bend) {
+  const a = 3 * from, b = 3 * to, x = p[b] - p[a], y = p[b + 1] - p[a + 1], z = p[b + 2] - p[a + 2], way = x * x + y * y + z * z;
+  for (let i = a + 3; i < b; i += 3) {
+    const u = p[i] - p[a], v = p[i + 1] - p[a + 1], w = p[i + 2] - p[a + 2];
+    const t = way > 0 ? clamp((u * x + v * y + w * z) / way, 0, 1) : 0;
+    if ((u - t * x) ** 2 + (v - t * y) ** 2 + (w - t * z) ** 2 > bend) return false;
+  }
+  return true;
+}
+
+function coarsePath(rows, path, k, flat, first, last) {
+  const slots = first.length, texels = Math.max(Math.ceil((slots + 2) / TEXELS), 1) * TEXELS;
+  const points = new Float32Array(3 * texels), sizes = new Uint16Array(2 * texels), verticals = new Int16Array(2 * texels);
+  points.set(flat);
+  for (let s = 0; s < slots; s++) {
+    const row = first[s];
+    if (row < 0) continue;
+    const slot = path.slot(row), times = TOPS.test(rows.types[rows.type[row]]) ? 1 : rows.layer[row] % k || (rows.layer[row] ? k : 1);
+    sizes[2 * s] = rows.width[row];
+    sizes[2 * s + 1] = Math.min(rows.height[row] * times, 65535);
+    verticals.set(path.verticals.subarray(2 * slot, 2 * slot + 2), 2 * s);
+  }
+  return { slots, texels, points, sizes, verticals, first, last };
+}
+
+/** The colours of a coarse path's slots, from those of all slots. */
+export function coarseColours(coarse, path, colours) {
+  const all = new Uint32Array(colours.buffer), own = new Uint32Array(coarse.texels);
+  for (let s = 0; s < coarse.slots; s++) if (coarse.first[s] >= 0) own[s] = all[path.slot(coarse.first[s])];
+  return new Uint8Array(own.buffer);
+}
+
+/** What of ranges of rows is drawn coarse and what fine, as ranges of slots: the layer that the slider has reached, and those after
+ * the last coarse one, are drawn as they are. */
+export function dividedRanges({ rows, path }, coarse, ranges) {
+  const rough = [], fine = [];
+  for (const range of ranges) {
+    const now = range.tint === PLAIN_TINT ? rows.layers[layerOf(rows, range.endRow - 1)] : null;
+    const first = countUpTo(coarse.last, range.firstRow - 1), reached = now ? Math.max(now.first, range.firstRow) : range.endRow;
+    const end = Math.max(countUpTo(coarse.last, reached - 1), first);
+    rough.push({ ...range, first, end });
+    if (!now) continue;
+    const done = end > first ? rows.layers[layerOf(rows, coarse.last[end - 1])].last + 1 : range.firstRow;
+    fine.push({ ...range, first: path.slot(Math.max(Math.min(done, reached), range.firstRow)) });
+  }
+  return { rough, fine };
+}
 
 const SLOW_MS = 50;
 const LONG_MS = 600; // a whole picture that takes longer is preceded by a coarse one also where only a choice has changed

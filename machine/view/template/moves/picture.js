@@ -5,12 +5,10 @@ import { showLegend } from "../panel/controls.js";
 import { HALF_HEIGHT, placeOn } from "../picture/camera.js";
 import { density, frameOf, outgrown, outlive, programOf, sizeOf } from "../picture/gl.js";
 import { carried, clamp, IDENTITY, moved, multiply, scaled, sub, undone } from "../picture/math.js";
-import { arrowsOf, based, bodiesOf, cutsOf, FROM_BELOW, ON_PLATE, ownInk, planesOf, surfaceColours } from "../picture/shapes.js";
-import { bodyOf, clipOf, linesOf, rgb, SOLID_FRAGMENT, SOLID_VERTEX, solidOf } from "../picture/solids.js";
+import { arrowsOf, based, bodiesOf, bodyOf, clipOf, cutsOf, FROM_BELOW, linesOf, ON_PLATE, ownInk, planesOf, rgb, SOLID_FRAGMENT, SOLID_VERTEX, solidOf, surfaceColours } from "../picture/shapes.js";
 import { BEAD_FAR, BEAD_NEAR, beadsOf, PAINT_FAR, PAINT_NEAR, shapesOf } from "./beads.js";
-import { coarseColours, coarseOf, dividedRanges } from "./coarse.js";
 import { coloured } from "./colours.js";
-import { paceOf } from "./pace.js";
+import { coarseColours, coarseOf, dividedRanges, paceOf } from "./pace.js";
 import { once } from "./rows.js";
 import { drawnRanges, PLAIN_TINT } from "./scene.js";
 import { MARK_FRAGMENT, MARK_VERTEX, MARKS, marksOn, waysOn } from "./ways.js";
@@ -107,8 +105,10 @@ function paintRest(stage, print, scene, seen) {
   };
   if (on.machine && !below) paintTable({});
   if (on.machine) bodies.nozzle.draw(head);
-  if (scene.tried) paintTried(stage.model, scene.tried, print.surfaces, work);
-  else {
+  if (scene.tried) { // the whole model as another row of the front would cut it; cut into one part only it has the first colour
+    const cuts = cutsOf(scene.tried);
+    for (const { range } of print.surfaces.parts) stage.model.draw(work, { cuts, range });
+  } else {
     paintPath(stage, seen.ranges, on, work, lift, seen.size);
     paintModel(stage, print, scene, seen, lift);
   }
@@ -142,12 +142,6 @@ function paintModel(stage, print, scene, { seenAt, section }, lift) {
   for (const [at, k] of above) stage.planes.draw(at, { strength: 0.3, range: piece(stage.planes, k) });
 }
 
-/** The whole model as another row of the front would cut it; cut into one part only it has the first colour. */
-function paintTried(model, row, { parts }, seen) {
-  const cuts = cutsOf(row);
-  for (const { range } of parts) model.draw(seen, { cuts, range });
-}
-
 /** The slot of the bead at a place of the picture, or -1: one pixel drawn with numbers for colours. */
 function slotAt(gl, stage, { beads, ranges }, [x, y]) {
   if (!stage.beads || !ranges.length) return -1;
@@ -167,9 +161,7 @@ const COARSE_SHARE = 0.6; // of the canvas' width and height, drawn while all mo
 
 /** Has the card compile all programs while the page reads the print. */
 export function compileAll(gl) {
-  const pairs = [
-    [BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR], [SOLID_VERTEX, SOLID_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT],
-  ];
+  const pairs = [[BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR], [SOLID_VERTEX, SOLID_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT]];
   pairs.forEach((pair) => programOf(gl, ...pair));
 }
 
@@ -186,7 +178,10 @@ export function pictureOf(gl, print, scene, camera, bells, showMarkers) {
     painter.stage?.coarse.paint(colours);
     tell();
   };
-  const reds = () => painter.stage?.model?.paint(surfaceColours(print.surfaces, ownInk, redOf(scene)));
+  const reds = () => {
+    const red = scene.tried && scene.risky === "printed" ? "none" : scene.risky; // what another row of the front leaves risky is not known face by face
+    painter.stage?.model?.paint(surfaceColours(print.surfaces, ownInk, red));
+  };
   const build = () => {
     painter.build();
     colour();
@@ -204,7 +199,8 @@ export function pictureOf(gl, print, scene, camera, bells, showMarkers) {
   addEventListener("beforeprint", () => {
     painter.begin();
     painter.step(Infinity);
-    keepPicture(canvas);
+    const picture = Object.assign($("picture"), { width: canvas.width, height: canvas.height }); // WebGL's own is empty by the time that pages are laid out
+    picture.getContext("2d").drawImage(canvas, 0, 0);
   });
   return { canvas, ask: pace.ask, moved: pace.moved, rowAt: (event) => print.path.row(painter.slotUnder(event)) };
 }
@@ -263,14 +259,5 @@ function painterOf(gl, print, scene, camera, showMarkers) {
   return painter;
 }
 
-/** Which faces are red: what another row of the front leaves risky is not known face by face. */
-const redOf = ({ risky, tried }) => (tried && risky === "printed" ? "none" : risky);
-
 const countSlots = (ranges) => ranges.reduce((sum, { first, end }) => sum + end - first, 0);
 const countRows = (ranges) => ranges.reduce((sum, range) => sum + range.endRow - range.firstRow, 0);
-
-/** What the canvas shows, kept on paper: WebGL's own is empty by the time that pages are laid out. */
-function keepPicture(canvas) {
-  const picture = Object.assign($("picture"), { width: canvas.width, height: canvas.height });
-  picture.getContext("2d").drawImage(canvas, 0, 0);
-}

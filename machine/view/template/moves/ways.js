@@ -2,7 +2,7 @@
 
 import { cornersOn, programOf } from "../picture/gl.js";
 import { clamp, countUpTo, length, mix, sub } from "../picture/math.js";
-import { linesOf } from "../picture/solids.js";
+import { linesOf } from "../picture/shapes.js";
 import { KIND, placeAt, workpieceOf } from "./rows.js";
 
 const PLAIN_WAY = [76, 126, 196, 200];

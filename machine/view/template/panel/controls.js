@@ -4,8 +4,7 @@ import { $, duration, listen, made, numberIn, optionsOf, partsInWords, swatch, s
 import { RAMP, typeColour } from "../moves/colours.js";
 import { KIND } from "../moves/rows.js";
 import { mix } from "../picture/math.js";
-import { sectionAsked } from "../picture/shapes.js";
-import { hex } from "../picture/solids.js";
+import { hex, sectionAsked } from "../picture/shapes.js";
 
 export function controlsOf(print, scene, bells) {
   const { parts } = print.header, posed = parts.filter((part) => part.base);

@@ -1,6 +1,6 @@
 // Outside: with whom the page talks: the workbench's page in which it may lie, and the server of a running print.
 
-import { $, duration, hide, listen, onData, tell, toggle } from "../elements.js";
+import { $, hide, listen, onData, tell, toggle } from "../elements.js";
 
 /** The workbench says {tiltprint: "finding", finding}, {..: "line", line}, {..: "text", text: the file}, {..: "theme", dark}, {..: "view", yaw, pitch in
  * radians}; it is told the latter, too, when a hand has turned the view. */
@@ -39,7 +39,7 @@ export function follow(scene, player) {
   let shown = -1;
   const ask = async () => {
     const state = await fetch("state", { cache: "no-store" }).then((answer) => answer.json()).catch(() => null);
-    tell({ live: state ? liveTold(state) : "the print's computer does not answer" });
+    tell({ live: state ? state.told : "the print's computer does not answer" });
     if (!state) return setTimeout(ask, 5 * ASK_EVERY_MS);
     hide({ orders: state.is_over });
     [pause.hidden, resume.hidden] = [state.is_away, !state.is_away];
@@ -61,18 +61,4 @@ function orders() {
     const answer = await fetch(`order/${order}`, { method: "POST" }).catch(() => null);
     if (!answer?.ok) tell({ live: NOT_ARRIVED });
   });
-}
-
-function liveTold(told) {
-  const heat = (name, value, target) => value != null && `${name} ${Math.round(value)}${target ? ` of ${Math.round(target)}` : ""} °C`;
-  return [
-    told.share ? `${told.state}, ${Math.floor(100 * told.share)} %` : told.state,
-    told.file_line && `line ${told.file_line}`,
-    heat("nozzle", told.nozzle_c, told.nozzle_target_c),
-    heat("bed", told.bed_c, told.bed_target_c),
-    told.heat_is_old && told.nozzle_c != null && "as last known",
-    told.left_s && `${duration(told.left_s)} left`,
-    told.message,
-    told.warning,
-  ].filter(Boolean).join(" · ");
 }

@@ -3,7 +3,7 @@
 import { $, button, findingButton, hide, listen, made, putAt, roughly, rowOf, termsOf } from "../elements.js";
 import { standing } from "../moves/picture.js";
 import { carried, projected } from "../picture/math.js";
-import { MOST_CUTS } from "../picture/solids.js";
+import { MOST_CUTS } from "../picture/shapes.js";
 
 const orDash = (value, told) => (value === null ? "–" : told(value));
 const FRONT = [
@@ -51,13 +51,11 @@ function showChoice(row, drawn) {
 const WORDY = 24; // letters: a column with longer cells is text, not figures
 
 export function showReport({ report, thinned, made_by: maker }) {
-  const notes = [...(thinned ? [thinnedTold(thinned)] : []), `made by ${maker}`];
+  const many = (number) => number.toLocaleString("en"), notes = [`made by ${maker}`];
+  if (thinned) notes.unshift(`of ${many(thinned.rows)} moves ${many(thinned.kept)} are shown: points inside straight strokes were left out`);
   $("report-text").append(made("dl", {}, ...termsOf(report.facts)), ...report.tables.map(sectionOf), ...notes.map(noteOf));
   listen("click", { print: () => window.print() });
 }
-
-const thinnedTold = ({ rows, kept }) =>
-  `of ${rows.toLocaleString("en")} moves ${kept.toLocaleString("en")} are shown: points inside straight strokes were left out`;
 
 const noteOf = (text) => made("p", { className: "note", text });
 

@@ -1,5 +1,6 @@
 // Camera: an eye that circles a target, z up, moved by mouse, fingers and keys.
 
+import { onData } from "../elements.js";
 import { add, bounds, clamp, cross, dot, length, moved, multiply, perspective, RAD, scaled, sub } from "./math.js";
 
 const FARTHEST_MM = 1000; // behind the work: room for the machine
@@ -16,17 +17,11 @@ export function cameraOf() {
   camera.eye = () => add(camera.target, scaled(outward(), camera.distance));
   camera.right = () => [-Math.sin(camera.yaw), Math.cos(camera.yaw), 0];
   camera.up = () => cross(outward(), camera.right());
-  camera.toEye = () => {
-    const [r, u, o] = [camera.right(), camera.up(), outward()];
-    return multiply([r[0], u[0], o[0], 0, r[1], u[1], o[1], 0, r[2], u[2], o[2], 0, 0, 0, 0, 1], moved(scaled(camera.eye(), -1)));
-  };
-  camera.lens = (aspect) => {
-    const far = camera.distance + Math.max(8 * camera.radius, FARTHEST_MM);
-    return perspective(HALF_HEIGHT, aspect, camera.distance / 40, far);
-  };
   /** How the eye sees what a matrix puts somewhere, {toEye, toClip}, in a picture of a size. */
   camera.seen = ([width, height]) => {
-    const view = camera.toEye(), lens = camera.lens(width / height);
+    const { distance, radius } = camera, far = distance + Math.max(8 * radius, FARTHEST_MM);
+    const [r, u, o] = [camera.right(), camera.up(), outward()], turn = [r[0], u[0], o[0], 0, r[1], u[1], o[1], 0, r[2], u[2], o[2], 0, 0, 0, 0, 1];
+    const view = multiply(turn, moved(scaled(camera.eye(), -1))), lens = perspective(HALF_HEIGHT, width / height, distance / 40, far);
     return (matrix) => {
       const toEye = multiply(view, matrix);
       return { toEye, toClip: multiply(lens, toEye) };
@@ -41,6 +36,8 @@ export function cameraOf() {
     camera.yaw -= dx;
     camera.pitch = clamp(camera.pitch + dy, -89.5 * RAD, 89.5 * RAD);
   };
+  /** Looks from a side, yaw and pitch in degrees. */
+  camera.lookFrom = (yaw, pitch) => Object.assign(camera, { yaw: yaw * RAD, pitch: pitch * RAD });
   /** Shifts the target across the view; dx, dy in picture heights. */
   camera.pan = (dx, dy) => {
     const span = 2 * HALF_HEIGHT * camera.distance;
@@ -72,12 +69,12 @@ const VIEWS = { front: [-90, 0], side: [0, 0], top: [-90, 89.5] };
 
 /** The buttons that look from a side, or a corner, degrees; from that at first. */
 export function viewButtons(camera, corner, changed) {
-  const look = (name) => {
-    [camera.yaw, camera.pitch] = (VIEWS[name] || [corner, 24]).map((angle) => angle * RAD);
+  const look = ({ view }) => {
+    camera.lookFrom(...(VIEWS[view] || [corner, 24]));
     changed();
   };
-  for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => look(button.dataset.view));
-  look("corner");
+  onData("view", look);
+  look({});
 }
 
 /** Where on the canvas an event is: -1..1 upwards, and as far across as the canvas is wider than high. */

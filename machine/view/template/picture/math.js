@@ -13,16 +13,10 @@ export const unit = (a) => scaled(a, 1 / (length(a) || 1));
 
 export const IDENTITY = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1];
 
-export function multiply(a, b) {
-  const out = new Array(16);
-  for (let column = 0; column < 4; column++)
-    for (let row = 0; row < 4; row++) {
-      let sum = 0;
-      for (let k = 0; k < 4; k++) sum += a[k * 4 + row] * b[column * 4 + k];
-      out[column * 4 + row] = sum;
-    }
-  return out;
-}
+export const multiply = (a, b) => IDENTITY.map((_, place) => {
+  const row = place % 4, column = place - row;
+  return a[row] * b[column] + a[row + 4] * b[column + 1] + a[row + 8] * b[column + 2] + a[row + 12] * b[column + 3];
+});
 
 export const moved = (v) => [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, v[0], v[1], v[2], 1];
 

@@ -1,27 +1,22 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, button, disable, duration, hide, listen, made, notice, onData, onKeys, tabsOf, tell, themeSwitch, toggle } from "../../../view/template/elements.js";
+import { $, button, disable, duration, hide, listen, made, notice, onData, onKeys, putNew, tabsOf, tell, themeSwitch, toggle, withWholeOptions } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
 import { LINE_TOLD, openLine, send } from "./line.js";
-import { putNew, withWholeOptions } from "./lists.js";
-import { benchesPanel, devicesPanel } from "./model/benches.js";
+import { benchesPanel, devicesPanel, platePanel } from "./model/benches.js";
 import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
-import { facetsOf, modelFetcher, modelOf, pedestalOf, thumbnailsOf } from "./model/model.js";
+import { bodiesOf, facetsOf, modelFetcher, modelOf, thumbnailsOf } from "./model/model.js";
 import { ringsOf } from "./model/rings.js";
 import { marksPanel } from "./parts/marks-panel.js";
 import { partsList, partsPanel } from "./parts/parts-panel.js";
 import { apartPanel } from "./parts/pieces.js";
 import { handlesOf, obstacleOf, planesPanel } from "./parts/planes.js";
-import { printFrame } from "./print/print-frame.js";
-import { printPanel } from "./print/print-panel.js";
-import { titleOfModel } from "./print/print-shown.js";
-import { axesOf } from "./scene/axes.js";
-import { clicksOf, handsOf } from "./scene/clicks.js";
+import { printFrame, printPanel } from "./print/print-panel.js";
+import { tellTitle } from "./print/print-shown.js";
+import { axesOf, clicksOf, handsOf, sectionView } from "./scene/clicks.js";
 import { pictureOf } from "./scene/picture.js";
-import { sectionView } from "./scene/section-view.js";
 import { settingsPanel } from "./settings/settings-panel.js";
-import { saveMenu } from "./slice/save-menu.js";
-import { comparePanel, slicesPanel, stopsPanel, wallsOf } from "./slice/slices-panel.js";
+import { comparePanel, saveMenu, slicesPanel, stopsPanel, wallsOf } from "./slice/slices-panel.js";
 import { keptLook, onNew, onState, store, subscribe, update } from "./store.js";
 
 function main() {
@@ -45,12 +40,12 @@ function main() {
   subscribe(onlyWithLine);
   onState(({ note }) => notice(note, "note"));
   slicesPanel(printFrame(camera, picture));
-  const panels = [problemLine, elapsedTimes, historyMenu, previewOf, benchesPanel, devicesPanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
+  const panels = [problemLine, elapsedTimes, historyMenu, previewOf, benchesPanel, devicesPanel, platePanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
   for (const begin of [...panels, printPanel, clicksOf, modelOf, placePanel, thumbnailsOf, apartPanel]) begin(picture);
   if (picture) {
     const ringPlaces = ringsOf(picture);
     subscribe((now, before) => { if (now.dark !== before.dark || !before.state) picture.machine(now.state.machine, now.dark); });
-    for (const drawn of [wallsOf, obstacleOf, handlesOf, facetsOf, pedestalOf]) drawn(picture);
+    for (const drawn of [wallsOf, obstacleOf, handlesOf, facetsOf, bodiesOf]) drawn(picture);
     handle($("canvas"), camera, handsOf(camera, picture));
     sectionView(picture);
     listen("click", { fit: () => picture.fit(ringPlaces()) });
@@ -69,7 +64,7 @@ function main() {
 
 function tellState({ model, busy, undo, redo, search, slicing, preparing, machine, material, process }) {
   const root = document.documentElement;
-  titleOfModel(model ? model.name : "");
+  tellTitle({ model: model ? model.name : "" });
   const summary = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : preparing ? "preparing the model for planes …" : `${machine.name} · ${material} · ${process}`;
   tell({ title: model ? model.name : "tiltprint", summary });
   hide({ drop: Boolean(model || busy) });
@@ -85,14 +80,14 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
 function onlyWithLine({ state, line }) {
   const none = line !== "open";
   document.querySelectorAll("#panel > section:not(#printing) fieldset").forEach((fields) => { fields.disabled = none; });
-  disable({ undo: none || !state.undo, redo: none || !state.redo, save: none, again: none, "put-near": none });
+  disable({ undo: none || !state.undo, redo: none || !state.redo, save: none, again: none });
 }
 
 /** What could not be done last, for as long as it is so or until it is read. */
 function problemLine() {
   onState(({ problem, refused, units }) => {
     putNew($("problem"), problem, () => withWholeOptions(problem)); // read aloud once
-    hide({ problem: !problem, "put-near": !refused?.near });
+    hide({ problem: !problem, "put-near": !refused?.near, "put-aside": !refused });
     putNew($("units"), units?.words || [], () => (units?.words || []).map((unit) => button(`in ${unit}`, () => send({ do: "unit", unit }))));
   });
 }

@@ -67,7 +67,5 @@ def test_export_without_a_name_writes_the_model_s_here_and_ends_with_a_verdict(
     Path("box.gcode").write_text("G28\n")
     assert main(["export", "box.stl", *FAST]) == 1
     assert "output box.gcode exists and was not written by tiltprint: -o names another file" in capsys.readouterr().err
-    assert main(["print", "box.stl", *FAST, "--as-is"]) == 0
-    told = capsys.readouterr()
-    assert "no --port is given, so the simulated printer prints" in told.err
-    assert re.search(r"\ndone in \d+s\n$", told.out)
+    assert main(["print", "box.stl", *FAST, "--as-is", "--port", "sim"]) == 0
+    assert re.search(r"\ndone in \d+s\n$", capsys.readouterr().out)

@@ -8,7 +8,7 @@ import pytest
 
 from machine.link.protocol.states import TABLE, State
 from tests.machine.link.protocol.test_connection import Table, numbered_to, opened
-from tools.docs.make_tables import SERIAL, page
+from tools.docs.make_tables import STATES, diagram
 
 KILLED = b"Error:Printer halted. kill() called!\n"
 REFUSED = b"Error:checksum mismatch, Last Line: 10\nResend: 11\nok\n"
@@ -94,9 +94,9 @@ def test_a_printer_that_never_answers_any_more_is_given_up_from_every_state(stat
 
 
 def test_the_diagram_of_the_docs_is_the_table() -> None:
-    """Every arrow of the page is read back."""
-    text = SERIAL.read_text(encoding="utf-8")
-    assert page(text) == text, "run python tools/docs/make_tables.py"
+    """Every arrow of the picture is read back."""
+    text = STATES.read_text(encoding="utf-8")
+    assert text == diagram(), "run python tools/docs/make_tables.py"
     arrows = {
         (begin, word, end)
         for begin, end, words in re.findall(r"^    ([A-Z]+) --> ([A-Z]+): (.+)$", text, re.MULTILINE)

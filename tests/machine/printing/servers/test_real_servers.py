@@ -1,7 +1,9 @@
-"""The servers themselves, where they are installed: variables name the programs, as docs/network.md tells.
+"""The servers themselves, where they are installed: variables name the programs.
 
-TILTPRINT_OCTOPRINT=/path/to/octoprint          with its own virtual printer
-TILTPRINT_MOONRAKER=/path/to/moonraker          before a stub of Klipper's API server
+TILTPRINT_OCTOPRINT=/path/to/octoprint          with its own virtual printer (pip install OctoPrint==1.11.8)
+TILTPRINT_MOONRAKER=/path/to/moonraker          before a stub of Klipper's API server (pip install moonraker==0.11.0)
+
+Each server needs an environment of its own.
 """
 
 import os

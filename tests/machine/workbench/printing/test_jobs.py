@@ -173,6 +173,13 @@ def test_a_print_that_is_over_keeps_its_last_moment_in_the_state_in_which_it_end
     )
 
 
+def test_a_warning_stands_beside_the_state_and_is_read_aloud() -> None:
+    lost = "this print can no longer be resumed"
+    told = JobState(PrintStatus(PrintState.PRINTING, share=0.5, warning=lost), live=True, name="box").json()
+    assert told["how"] == f"printing, 50 % · {lost}"
+    assert told["texts"]["run-news"] == f"box: printing: {lost}"
+
+
 def test_progress_before_a_print_is_told_only_while_it_lasts() -> None:
     told: list[tuple[str, ...]] = []
     person = AtPage(SimpleNamespace(tell=lambda said: told.append(said)))

@@ -1,9 +1,8 @@
-// Benches: several models at once, each on a bench and in a page of its own; what was left from earlier; and the devices that were let in.
+// Benches: several models at once, on one plate or each on a bench and in a page of its own; what was left from earlier; and the devices that were let in.
 
-import { $, button, hide, listen, made, notice, partsInWords, tell } from "../../../../view/template/elements.js";
-import { lineAt, OWN_PAGE } from "../line.js";
-import { clock, putRows, removeButton } from "../lists.js";
-import { onNew } from "../store.js";
+import { $, button, clock, hide, listen, made, moment, notice, partsInWords, putRows, removeButton, sayIn, tell } from "../../../../view/template/elements.js";
+import { lineAt, OWN_PAGE, send } from "../line.js";
+import { onNew, onState } from "../store.js";
 
 const TOLD_MS = 8000;
 const HERE = Number(location.pathname.split("/").at(-2));
@@ -21,7 +20,7 @@ async function openBench(model = null) {
     notice("The browser opens no further page by itself: the new bench is in the list.", "benches");
     setTimeout(() => notice("", "benches"), TOLD_MS);
   }
-  if (model) await sendFile(model, `../${told.number}/`);
+  if (model) await sendFile(model, {}, `../${told.number}/`);
 }
 
 /** What a person has dropped or chosen: the first model, and plans after it, for this bench; every further model on a bench of its own. */
@@ -31,8 +30,8 @@ export async function takeFiles(files) {
   for (const file of [first, ...files.filter(isPlan)].flat()) await sendFile(file);
 }
 
-/** Sends a file to a bench and shows how much of it is sent, with a button that breaks it off; what is wrong with it comes back by the line. */
-const sendFile = (file, to = "") => new Promise((done) => {
+/** Sends a file to a bench and shows how much of it is sent, with a button that breaks it off; what is wrong with it comes back by the line; how: more of its address. */
+const sendFile = (file, how = {}, to = "") => new Promise((done) => {
   const request = new XMLHttpRequest(), mb = (bytes) => (bytes / 1e6).toFixed(1);
   request.upload.onprogress = ({ loaded, total }) => {
     hide({ sending: false });
@@ -42,9 +41,28 @@ const sendFile = (file, to = "") => new Promise((done) => {
   request.upload.onloadend = () => hide({ sending: true }); // it is read now, of which the state tells
   request.onloadend = done;
   $("sending-cancel").onclick = () => request.abort();
-  request.open("POST", `${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE })}`);
+  request.open("POST", `${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE, ...how })}`);
   request.send(file);
 });
+
+/** The models on the plate, each with its number of copies, and what puts further ones there. */
+export function platePanel() {
+  listen("click", { "add-model": () => $("add-file").click() });
+  listen("change", { "add-file": async () => {
+    for (const file of [...$("add-file").files]) await sendFile(file, { add: "yes" });
+    $("add-file").value = "";
+  } });
+  onState(({ addable }) => sayIn("add-opened", addable && `Add ${addable} to the plate instead`));
+  onNew(({ model, copies, beside, problem }) => [model ? [{ name: model.name, copies }, ...beside] : [], problem], ([models, problem]) => putRows(
+    models.map(({ name, copies }, number) => ({ id: name, told: `${number} ${copies} ${problem}`, make: () => plateRow(name, copies, number) })), $("plate-list")));
+}
+
+function plateRow(name, copies, number) {
+  const change = (count) => send(number ? { do: "beside", number, count } : { do: "copies", count });
+  const onchange = ({ target }) => change(Math.max(1, Math.round(Number(target.value))));
+  const field = made("input", { type: "number", min: 1, value: copies, ariaLabel: `Copies of ${name}`, onchange });
+  return made("li", {}, made("span", { text: name }), field, number ? removeButton(`Take ${name} off the plate`, () => change(0)) : "");
+}
 
 function benchRow({ number, name, parts, work }) {
   const text = `${name || "nothing yet"}${work ? `, ${work}` : parts ? `, ${partsInWords(parts)}` : ""}`;
@@ -66,11 +84,6 @@ const OFFERS = { // most: entries that are listed, until all of them are asked f
   left: { list: "left-files", most: 5, wordsOf: ({ bytes, written_s: written }) => [`${Math.ceil(bytes / 1000).toLocaleString("en")} kB`, moment(written)] },
 };
 
-function moment(seconds) {
-  const at = new Date(1000 * seconds);
-  return at.toDateString() === new Date().toDateString() ? clock(seconds) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
-}
-
 /** What is there from earlier, the newest first: work that was kept, or files that a workbench has left which was killed; at first the newest of each name. */
 export async function offer(what) {
   const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], { list, most } = OFFERS[what];
@@ -87,14 +100,12 @@ function offerRow(what, one) {
   return made("li", {}, button("", act("POST"), {}, made("span", { text: name }), made("small", { text: words })), removeButton(`Remove ${name}, ${words}`, act("DELETE")));
 }
 
-const PAIRED = "This device is paired. Files of the computer, and printers that were not found there, are named on the page of the computer itself.";
-
 /** On this computer's page, where the workbench is open to the network: which devices are paired, each with a button that lets it go. */
 export function devicesPanel() {
   const { network } = document.documentElement.dataset;
   if (network !== "open" && network !== "paired") return;
   hide({ network: false });
-  if (network === "paired") tell({ "network-told": PAIRED });
+  if (network === "paired") tell({ "network-told": "This device is paired. Files of the computer, and printers that were not found there, are named on the page of the computer itself." });
   else openDevicesLine();
 }
 

@@ -1,9 +1,8 @@
 // Model panel: the file, how it is turned, what overhangs then, how large it is, and where on the plate it and its copies stand.
 
-import { $, alike, button, hide, listen, numberIn, onData, putAt, sayIn, tell } from "../../../../view/template/elements.js";
+import { $, alike, button, fill, hide, listen, listIn, mm2, numberIn, onData, putAt, putNew, sayIn, tell, tellIn } from "../../../../view/template/elements.js";
 import { add, sub } from "../../../../view/template/picture/math.js";
 import { ask, send } from "../line.js";
-import { fill, listIn, mm2, putNew, tellIn } from "../lists.js";
 import { gripOf } from "../scene/grip.js";
 import { turnedFurther } from "../scene/triangles.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
@@ -58,13 +57,10 @@ function tellFile({ plates, has_settings: has, settings_note: note }) {
 
 /** A file may be dropped anywhere on the page. */
 function dropping() {
-  const over = (whether) => $("scene").classList.toggle("over", whether);
-  addEventListener("dragover", (event) => { event.preventDefault(); over(true); });
-  addEventListener("dragleave", () => over(false));
-  addEventListener("drop", (event) => {
+  for (const name of ["dragover", "dragleave", "drop"]) addEventListener(name, (event) => {
     event.preventDefault();
-    over(false);
-    takeFiles([...event.dataTransfer.files]);
+    $("scene").classList.toggle("over", name === "dragover");
+    if (name === "drop") takeFiles([...event.dataTransfer.files]);
   });
 }
 
@@ -83,11 +79,10 @@ export function sizePanel() {
   }));
   onState(({ standing, scale: factor, machine, problem, place_mm: place }, before) => {
     if (!standing) return;
-    const fresh = problem !== before?.problem || !alike(standing, shown);
+    const anew = problem !== before?.problem || !alike(standing, shown);
     shown = standing;
-    const put = (input, value) => { if (fresh) input.value = value; else fill(input, value); };
-    put($("scale"), Number((100 * factor).toPrecision(6)));
-    sides.forEach((side, k) => put(side, standing.size_mm[k].toFixed(2)));
+    fill($("scale"), Number((100 * factor).toPrecision(6)), anew);
+    sides.forEach((side, k) => fill(side, standing.size_mm[k].toFixed(2), anew));
     tell({ "fit-told": standing.problem ? `${place.some(Boolean) ? "Not at this place" : "Too large in one piece"}: ${standing.problem}` : `It fits: ${machine.name} reaches all of it.` });
     $("fit-told").classList.toggle("refused", Boolean(standing.problem));
   });
@@ -96,8 +91,9 @@ export function sizePanel() {
 const MIDDLE = [0, 0], STEP_MM = 1, LARGE_STEP_MM = 10; // the latter with Shift held
 const WAYS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
-const placeNow = () => store.placing || store.state.place_mm;
+const stepOf = ({ shiftKey }) => (shiftKey ? LARGE_STEP_MM : STEP_MM);
 const rounded = (place, step) => place.map((x) => step * Math.round(x / step));
+const placeNow = () => store.placing || store.state.place_mm;
 
 /** Has the model stand somewhere else; the picture has it there until that is done or refused. */
 function put(place) {
@@ -123,7 +119,7 @@ export function placePanel(picture) {
   subscribe(() => {
     const now = JSON.stringify(placeNow());
     if (store.state.copies_mm) copies = store.state.copies_mm.map((place) => [...place, 0]); // none are known yet of a model that has just been turned
-    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])));
+    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])), [...placeNow(), 0]);
     if (now === told) return;
     told = now;
     fields.forEach((field, axis) => { field.value = placeNow()[axis]; });
@@ -133,7 +129,7 @@ export function placePanel(picture) {
 
 /** The knob at the model's foot. */
 function handleOf(picture) {
-  const knob = $("hand-place");
+  const knob = $("hand-place"), hold = (placing) => update({ placing });
   /** Where a hand is on the plate, from the middle of the model as it stands now; null: it looks above the plate's horizon. */
   const onPlate = (event) => {
     const [eye, along] = picture.sight(event);
@@ -141,16 +137,16 @@ function handleOf(picture) {
   };
   gripOf(knob, {
     take: (event) => {
-      const from = onPlate(event);
-      return from && { from, stood: placeNow() };
+      const from = onPlate(event), stood = placeNow();
+      let to = from;
+      return from && ((later) => {
+        to = onPlate(later) || to;
+        return rounded(stood.map((x, axis) => x + to[axis] - from[axis]), stepOf(later));
+      });
     },
-    move: ({ from, stood }, event) => {
-      const to = onPlate(event);
-      if (to) update({ placing: rounded(stood.map((x, axis) => x + to[axis] - from[axis]), event.shiftKey ? LARGE_STEP_MM : STEP_MM) });
-    },
+    hold, drop: () => hold(null),
     put: () => { if (store.placing) put(store.placing); },
-    drop: () => update({ placing: null }),
-    step: (sign, { key, shiftKey }) => update({ placing: WAYS[key].map((way, axis) => placeNow()[axis] + way * (shiftKey ? LARGE_STEP_MM : STEP_MM)) }),
+    step: (sign, event) => WAYS[event.key].map((way, axis) => placeNow()[axis] + way * stepOf(event)),
   });
   picture.drawn.push(() => {
     const shown = store.tab === "model" && store.state?.model && store.triangles && store.clicks !== "lay";

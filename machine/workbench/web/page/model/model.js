@@ -1,17 +1,15 @@
 // Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal; and the ways in which it can lie.
 
-import { $, alike, button, hide, made, notice, swatches, tell } from "../../../../view/template/elements.js";
+import { $, alike, button, hide, made, mm2, notice, swatches, tell } from "../../../../view/template/elements.js";
 import { add, scaled, sub } from "../../../../view/template/picture/math.js";
 import { trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { AGAIN_MS, newest, send } from "../line.js";
-import { mm2 } from "../lists.js";
 import { fadedColours } from "../parts/pieces.js";
 import { planesNow } from "../parts/planes.js";
 import { cornersAt, faceMet } from "../scene/face-tree.js";
 import { overhanging, standingBy, trianglesFrom } from "../scene/triangles.js";
 import { onState, store, subscribe, update } from "../store.js";
 
-const MISSING = "The model has not come from tiltprint, so it is not drawn yet; it is asked for again.";
 const MANY_FACES = 100000; // to fetch and draw them takes a moment, which is told
 
 /** A function that fetches the triangles of a model where they are others than those that are there; again(): asks once more. */
@@ -24,7 +22,7 @@ export function modelFetcher(picture, again) {
   const take = (triangles, key) => {
     const missing = key && !triangles;
     if (missing) setTimeout(again, AGAIN_MS);
-    notice(missing ? MISSING : "", "model");
+    notice(missing ? "The model has not come from tiltprint, so it is not drawn yet; it is asked for again." : "", "model");
     picture?.show(triangles);
     update({ triangles });
     picture?.fit();
@@ -68,15 +66,17 @@ function look(picture, red) {
   $("legend").replaceChildren(...(entries.length ? [made("b", { text: "parts, in print order" }), ...entries] : []));
 }
 
-/** What the model stands on, while it stands still: turned, it would have another one. */
-export function pedestalOf(picture) {
-  const take = (body, of) => {
-    update({ pedestal: body && { of, body } });
-    document.documentElement.dataset.pedestal = body ? of : "";
-  };
-  const fetchPedestal = newest({ read: async (answer) => trianglesFrom(await answer.arrayBuffer()), take, insists: true });
-  onState(({ pedestal }) => fetchPedestal(pedestal, `pedestal/${pedestal}`));
-  subscribe(({ state, turning, pedestal }) => picture.pedestal(!turning && pedestal?.of === state.pedestal ? pedestal.body : null));
+/** What else stands on the plate while the model stands still, by its name: turned, it would have another pedestal, and the other models other places. */
+export function bodiesOf(picture) {
+  for (const name of ["pedestal", "others"]) {
+    const take = (body, of) => {
+      update({ [name]: body && { of, body } });
+      document.documentElement.dataset[name] = body ? of : "";
+    };
+    const fetchBody = newest({ read: async (answer) => trianglesFrom(await answer.arrayBuffer()), take, insists: true });
+    onState(({ [name]: key }) => { if (key !== null) fetchBody(key, `${name}/${key}`); }); // null: not known yet
+    subscribe(({ state, turning, [name]: there }) => picture[name](!turning && there?.of === (state[name] ?? there?.of) ? there?.body || null : null));
+  }
 }
 
 const COLOUR = [230, 159, 0, 255], FAINT = 0.3, LIT = 0.85;
@@ -89,9 +89,7 @@ function hullOf(facets) {
 }
 
 /** The facet of the hull under an event; -1: none. */
-function facetMet({ hull }, picture, event) {
-  return hull.owners[faceMet(hull, ...picture.ray(event)).face] ?? -1;
-}
+const facetMet = ({ hull }, picture, event) => hull.owners[faceMet(hull, ...picture.ray(event)).face] ?? -1;
 
 /** Lays the facet under an event down. */
 export function layFacet(picture, event) {

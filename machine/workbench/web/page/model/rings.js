@@ -25,10 +25,10 @@ export function ringsOf(picture) {
     const group = groups.find(({ dataset }) => dataset.ring === axis);
     Object.assign(group, { ariaValueNow: deg, ariaValueText: `${deg} degrees` });
   };
-  const preview = (axis, ring, deg) => {
-    turning = { axis, ring, deg };
-    told(axis, deg);
-    update({ turning: turnedFurther(store.state.rotation, scaled(RING_AXES[axis], deg)) });
+  const hold = (now) => {
+    turning = now;
+    told(now.axis, now.deg);
+    update({ turning: turnedFurther(store.state.rotation, scaled(RING_AXES[now.axis], now.deg)) });
   };
   const done = (taken) => {
     const last = turning;
@@ -42,16 +42,14 @@ export function ringsOf(picture) {
   groups.forEach((group) => {
     const axis = group.dataset.ring;
     gripOf(group, {
-      take: (event) => ({ ring: ringNow(), ...graspOf(picture, RING_AXES[axis], ringNow(), event) }),
-      move: (held, event) => {
-        const step = stepOf(event);
-        preview(axis, { ...held.ring, from: held.from }, Math.round(held.turnedTo(event) / step) * step);
+      take: (event) => {
+        const ring = ringNow(), { from, turnedTo } = graspOf(picture, RING_AXES[axis], ring, event);
+        return (later) => ({ axis, ring: { ...ring, from }, deg: Math.round(turnedTo(later) / stepOf(later)) * stepOf(later) });
       },
-      put: () => done(true),
-      drop: () => done(false),
+      hold, put: () => done(true), drop: () => done(false),
       step: (sign, event) => {
-        const { ring, deg } = turning || { ring: { ...ringNow(), from: 0 }, deg: 0 };
-        preview(axis, ring, deg + sign * stepOf(event));
+        const now = turning || { axis, ring: { ...ringNow(), from: 0 }, deg: 0 };
+        return { ...now, deg: now.deg + sign * stepOf(event) };
       },
     });
   });
@@ -64,11 +62,9 @@ export function ringsOf(picture) {
       const points = ringPoints(RING_AXES[group.dataset.ring], ring), middle = length(sub(eye, ring.centre));
       const seen = points.map((place) => ({ at: picture.placeOf(place), near: length(sub(eye, place)) < middle }));
       group.classList.toggle("turning", Boolean(turning) && turning.axis === group.dataset.ring);
-      const parts = { far: () => true, near: ({ near }) => near, reach: () => true };
-      for (const [name, wanted] of Object.entries(parts)) group.querySelector(`.${name}`).setAttribute("d", pathOf(seen, wanted));
+      for (const name of ["far", "near", "reach"]) group.querySelector(`.${name}`).setAttribute("d", pathOf(seen, ({ near }) => near || name !== "near"));
       const label = seen.reduce((best, spot) => (spot.at && spot.near && (!best || spot.at[1] < best[1]) ? spot.at : best), null) || [-99, -99];
-      group.querySelector("text").setAttribute("x", label[0]);
-      group.querySelector("text").setAttribute("y", label[1]);
+      group.querySelector("text").setAttribute("transform", `translate(${label})`);
     });
     showSweep(picture, turning);
   });
@@ -79,10 +75,7 @@ export function ringsOf(picture) {
 
 const onRing = (axis, { centre, radius }, angle) => ringOf(centre, axis, radius, 1, angle)[0];
 
-const ringPoints = (axis, { centre, radius }) => {
-  const points = ringOf(centre, axis, radius, RING_STEPS);
-  return [...points, points[0]];
-};
+const ringPoints = (axis, ring) => [...ringOf(ring.centre, axis, ring.radius, RING_STEPS), onRing(axis, ring, 0)];
 
 /** What a hand that takes a ring holds: the angle at which it has taken it (from), and how many degrees an event has turned it since: the ring's place
  * that is seen nearest to the hand follows it, of those within a quarter turn of the last one, so that it does not jump to the other side. */
@@ -105,13 +98,8 @@ function graspOf(picture, axis, ring, event) {
 
 /** An SVG path along the places that are seen and wanted. */
 function pathOf(seen, wanted) {
-  let text = "", open = false;
-  for (const spot of seen) {
-    const drawn = spot.at && wanted(spot);
-    if (drawn) text += `${open ? "L" : "M"}${spot.at[0].toFixed(1)} ${spot.at[1].toFixed(1)}`;
-    open = drawn;
-  }
-  return text;
+  const drawn = (spot) => spot?.at && wanted(spot);
+  return seen.map((spot, k) => (drawn(spot) ? `${drawn(seen[k - 1]) ? "L" : "M"}${spot.at.map((x) => x.toFixed(1)).join(" ")}` : "")).join("");
 }
 
 /** The sector by which the model is turned just now, and its angle. */
@@ -124,6 +112,5 @@ function showSweep(picture, turning) {
   const middle = picture.placeOf(ring.centre), end = places[steps];
   if (!middle || places.some((place) => !place)) return;
   $("ring-sweep").setAttribute("d", `M${[middle, ...places].map((place) => place.map((x) => x.toFixed(1)).join(" ")).join("L")}Z`);
-  $("ring-told").setAttribute("x", end[0]);
-  $("ring-told").setAttribute("y", end[1] - 10);
+  $("ring-told").setAttribute("transform", `translate(${end})`);
 }

@@ -1,11 +1,9 @@
 // Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
-import { $, alike, button, listen, made, numberIn, putAt, rowOf, swatch, tell } from "../../../../view/template/elements.js";
+import { $, alike, button, fill, listen, made, numberIn, putAt, putTable, removeButton, rowOf, swatch, tell } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
-import { boxCorners, boxEdges, trianglesOf } from "../../../../view/template/picture/shapes.js";
-import { wordOf } from "../../../../view/template/picture/solids.js";
+import { boxCorners, boxEdges, trianglesOf, wordOf } from "../../../../view/template/picture/shapes.js";
 import { newest, send } from "../line.js";
-import { fill, putTable, removeButton } from "../lists.js";
 import { modelSize } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";
 import { onState, store, subscribe, update } from "../store.js";
@@ -150,12 +148,11 @@ function knobOf(side, picture) {
   gripOf(knob, {
     take: (event) => {
       const zone = boxNow(), along = alongWay(picture, sidePlace(zone, side), axesOf(zone)[side.axis], event);
-      return along && { zone, along };
+      return along && ((later) => withSide(zone, side, zone[side.end][side.axis] + along(later)));
     },
-    move: ({ zone, along }, event) => holdBox(withSide(zone, side, zone[side.end][side.axis] + along(event))),
+    hold: holdBox, drop: () => holdBox(null),
     put: () => { if (store.zoneHand) putBox(store.zoneHand); },
-    drop: () => holdBox(null),
-    step: (sign) => holdBox(withSide(boxNow(), side, boxNow()[side.end][side.axis] + sign * STEP_MM)),
+    step: (sign) => withSide(boxNow(), side, boxNow()[side.end][side.axis] + sign * STEP_MM),
   });
   return knob;
 }

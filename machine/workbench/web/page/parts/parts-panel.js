@@ -1,8 +1,7 @@
 // Parts panel: the search, its front as a slider, and every part as a card, chosen there as in the picture, with keys and a menu for what is done to it.
 
-import { $, alike, button, disable, hide, listen, made, needsKey, partsInWords, roughly, swatch, tell, termsOf, toggle } from "../../../../view/template/elements.js";
+import { $, alike, button, disable, hide, listen, listIn, made, mm2, needsKey, newtons, partsInWords, putNew, roughly, swatch, tell, tellIn, termsOf, toggle } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
-import { listIn, mm2, newtons, putNew, tellIn } from "../lists.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 import { anglesOf, choosePart, figuresNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
 
@@ -93,7 +92,7 @@ function partsFigures() {
 
 /** What a card tells: icons, names and texts; the first part has neither cut nor joint. */
 function figuresOn(number, { volume_mm3: volume, support_mm2: support, rim_mm: rim, edge_deg: edge }) {
-  const told = (value, words) => (Number.isFinite(value) ? words(value) : "–"), joint = store.pieces?.parts.find(({ part }) => part.index === number)?.part.joint;
+  const told = (value, words) => (Number.isFinite(value) ? words(value) : "–"), joint = !store.hand && store.pieces?.parts.find(({ part }) => part.index === number)?.part.joint;
   const own = [["volume", "volume", told(volume, (mm3) => `${(mm3 / 1000).toFixed(2)} cm³`)], ["support", "support", told(support, mm2)]];
   const cut = [["seam", "seam", told(rim, (mm) => `${mm.toFixed(0)} mm`)], ["edge", "cut edge", told(edge, (deg) => `${deg.toFixed(0)}°`)]];
   const words = joint ? `${mm2(joint.area_mm2)}, breaks at about ${newtons(joint.load_n)} sideways at the tip${joint.weakest ? ": the weakest" : ""}` : "–";

@@ -1,10 +1,9 @@
 // Pieces: the parts as bodies of their own, drawn apart along their printing directions, so that the faces of the cuts are seen.
 
 import { $, listen, numberIn } from "../../../../view/template/elements.js";
-import { blockOf } from "../../../../view/template/moves/block.js";
+import { blockOf } from "../../../../view/template/moves/rows.js";
 import { add, bounds, dot, length, mix, scaled, sub } from "../../../../view/template/picture/math.js";
-import { arrowsOf, surfaceColours, surfacesOf } from "../../../../view/template/picture/shapes.js";
-import { hex, rgb, solidOf, wordOf } from "../../../../view/template/picture/solids.js";
+import { arrowsOf, hex, rgb, solidOf, surfaceColours, surfacesOf, wordOf } from "../../../../view/template/picture/shapes.js";
 import { newest } from "../line.js";
 import { faceMet } from "../scene/face-tree.js";
 import { store, subscribe, update } from "../store.js";
@@ -93,11 +92,11 @@ export function apartPanel(picture) {
   const fetchPieces = newest({ read: async (answer) => piecesIn(new Uint8Array(await answer.arrayBuffer())), take, begin: () => update({ pieces: null }) });
   $("apart").disabled = !picture;
   listen("input", { apart: () => {
-    update({ apart: numberIn("apart") });
+    update({ apart: numberIn("apart"), clicks: "" }); // which are for the whole model
     picture.fit();
   } });
   subscribe(({ state, tab, pieces, part, apart }, before) => {
-    $("apart-line").hidden = !state.parts || !state.model.drawn;
+    Object.assign($("apart-line"), { hidden: !state.parts || !state.model.drawn }).control.value = apart;
     if (tab === "parts" && !state.search && (state !== before.state || tab !== before.tab)) fetchPieces(keyOf(state), "pieces");
     const seen = apartNow() || (piecesSeen() && state.cuts.some((plane) => plane.limbs_mm)); // a limb's colour is seen on the piece alone
     picture?.pieces(seen ? pieces : null, pieces ? shiftsOf(pieces, apart) : [], part);

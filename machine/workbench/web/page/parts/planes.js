@@ -1,11 +1,9 @@
 // Planes: those that are looked at, as the bench has them or a hand holds one: their panel, the knobs in the picture, and what a refused one is in the way of.
 
-import { $, alike, disable, hide, listen, numberIn, onData, pressed, putAt, tell } from "../../../../view/template/elements.js";
-import { add, clamp, cross, dot, length, RAD, rotated, scaled, sub, turned, unit } from "../../../../view/template/picture/math.js";
-import { beside, boxesOf, chained, circle, headOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
-import { RED } from "../../../../view/template/picture/solids.js";
+import { $, alike, disable, fill, hide, listen, mm2, numberIn, onData, pressed, putAt, tell } from "../../../../view/template/elements.js";
+import { add, clamp, cornersOf, cross, dot, length, RAD, rotated, scaled, sub, turned, unit } from "../../../../view/template/picture/math.js";
+import { beside, boxesOf, chained, circle, headOf, RED, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { ask, send } from "../line.js";
-import { fill, mm2 } from "../lists.js";
 import { modelSize } from "../model/model-panel.js";
 import { alongWay, gripOf } from "../scene/grip.js";
 import { cornersAt } from "../scene/face-tree.js";
@@ -118,6 +116,7 @@ export function snapTo(face, picture) {
 }
 
 const REACH = 1.12; // of a section's radius at which the knobs of the tilt stand, as wide as its disc
+const ALONG = 0.7, KNOBS_PX = 44; // the knob along the normal, of that; the least radius, so that no knob hides another
 const STEP_MM = 0.5, STEP_DEG = 1;
 const KNOBS = [{ id: "hand-along", tilts: null }, { id: "hand-tilt-a", tilts: 0 }, { id: "hand-tilt-b", tilts: 1 }];
 
@@ -132,48 +131,51 @@ function sectionNow(picture) {
   return last.section;
 }
 
-const GAP_PX = 24, RIM_PX = 8; // of the tools: from the knobs, and from the picture's rim
+const GAP_PX = 24, RIM_PX = 8, TOP_PX = 56; // of the tools: from model and knobs, and from the picture's edges
 
-/** The tools of the chosen plane below or above places of the picture, all of them within it; without a place at its lower rim. */
-function putTools(places) {
+/** The tools of the chosen plane beside the model, level with y; where there is no room at the picture's lower edge, or below its upper one where that hides less of what is seen within so many pixels of y. */
+function putTools(picture, [, y], within) {
   const tools = $("plane-tools"), { clientWidth: width, clientHeight: height } = $("scene"), [wide, high] = [tools.offsetWidth, tools.offsetHeight];
-  const seen = places.filter(Boolean), xs = seen.map(([x]) => x), ys = seen.map(([, y]) => y), below = Math.max(...ys) + GAP_PX;
-  const top = below + high + RIM_PX < height ? below : Math.min(...ys) - GAP_PX - high;
-  const left = seen.length ? (Math.min(...xs) + Math.max(...xs) - wide) / 2 : (width - wide) / 2;
-  putAt(tools, [clamp(left, RIM_PX, width - wide - RIM_PX), clamp(seen.length ? top : height, RIM_PX, height - high - RIM_PX)]);
+  const low = height - high - RIM_PX, ends = cornersOf(picture.box()).map(picture.placeOf), left = Math.max(...ends.map((end) => (end ? end[0] : width))) + GAP_PX;
+  const hidden = [TOP_PX + high - y, y - low].map((over) => over + within + GAP_PX), edge = hidden[1] > Math.max(hidden[0], 0) ? TOP_PX : low;
+  putAt(tools, left + wide + RIM_PX < width ? [left, clamp(y - high / 2, TOP_PX, low)] : [(width - wide) / 2, edge]);
+}
+
+const HEAD_ON = 0.02; // sine between a normal and the sight, below which no side is across what is seen
+
+/** Directions in a plane at which its tilts are taken hold of, of which neither is seen where the other or the normal is. */
+function sidesOf({ normal }, place, picture) {
+  const toEye = unit(sub(picture.eye(), place)), across = cross(toEye, normal);
+  return length(across) < HEAD_ON ? beside(normal) : [unit(across), scaled(cross(normal, unit(across)), dot(normal, toEye) < 0 ? -1 : 1)];
 }
 
 /** Three knobs at the chosen plane: one moves it along its normal, two tilt it; by hand, finger or arrow keys; and its tools beside them. */
 export function handlesOf(picture) {
   let section = null; // of the chosen plane
-  const placeOf = ({ tilts }) => {
-    const { centre_mm: centre, radius_mm: radius } = section, { normal } = planeNow();
-    return add(centre, tilts === null ? scaled(normal, 0.6 * radius) : scaled(beside(normal)[tilts], REACH * radius));
-  };
+  const far = () => REACH * Math.max(section.radius_mm, KNOBS_PX * picture.pixelAt(section.centre_mm)); // from the middle, mm
+  const sideOf = ({ tilts }, plane) => (tilts === null ? plane.normal : sidesOf(plane, section.centre_mm, picture)[tilts]);
+  const placeOf = (knob) => add(section.centre_mm, scaled(sideOf(knob, planeNow()), (knob.tilts === null ? ALONG : 1) * far()));
   /** The plane moved by so many mm at a knob, from how it was when it was taken. */
-  const moved = ({ plane, about: { centre_mm: centre, radius_mm: radius }, tilts }, mm) => {
+  const moved = ({ plane, middle, arm, side, tilts }, mm) => {
     if (tilts === null) return { normal: plane.normal, offset_mm: plane.offset_mm + mm };
-    const axes = beside(plane.normal), angle = Math.atan2(mm, REACH * radius);
-    const normal = unit(turned(rotated(cross(axes[tilts], plane.normal), angle), plane.normal));
-    return { normal, offset_mm: dot(normal, centre) };
+    const normal = unit(turned(rotated(cross(side, plane.normal), Math.atan2(mm, arm)), plane.normal));
+    return { normal, offset_mm: dot(normal, middle) };
   };
-  const taken = ({ tilts }) => ({ plane: store.hand?.wanted || planeNow(), about: section, tilts });
-  const stepOf = ({ tilts }) => (tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * REACH * section.radius_mm);
+  const taken = ({ tilts }, plane = store.hand?.wanted || planeNow()) => ({ plane, middle: section.centre_mm, arm: far(), side: sideOf({ tilts }, plane), tilts });
   KNOBS.forEach((knob) => gripOf($(knob.id), {
     take: (event) => {
-      const along = alongWay(picture, placeOf(knob), planeNow().normal, event);
-      return along && { ...taken(knob), along };
+      const along = alongWay(picture, placeOf(knob), planeNow().normal, event), held = taken(knob);
+      return along && ((later) => moved(held, along(later)));
     },
-    move: (held, event) => holdPlane(moved(held, held.along(event))),
+    hold: holdPlane, drop: leavePlane,
     put: () => { if (store.hand) putPlane(store.hand.plane); },
-    drop: leavePlane,
-    step: (sign) => holdPlane(moved(taken(knob), sign * stepOf(knob))),
+    step: (sign) => moved(taken(knob), sign * (knob.tilts === null ? STEP_MM : Math.tan(STEP_DEG * RAD) * far())),
   }));
   const place = () => {
-    $("handles").hidden = !section || !planeNow() || isLocked();
-    const places = section && planeNow() ? KNOBS.map((knob) => picture.placeOf(placeOf(knob))) : [];
-    if (!$("handles").hidden) KNOBS.forEach(({ id }, k) => putAt($(id), places[k]));
-    if (!$("plane-tools").hidden) putTools(places);
+    $("handles").hidden = !section || !planeNow() || isLocked() || Boolean(store.clicks);
+    if (!$("handles").hidden) KNOBS.forEach((knob) => putAt($(knob.id), picture.placeOf(placeOf(knob))));
+    const middle = section && picture.placeOf(section.centre_mm);
+    if (!$("plane-tools").hidden) putTools(picture, middle || [0, 0], middle ? far() / picture.pixelAt(section.centre_mm) : 0);
   };
   picture.drawn.push(place);
   subscribe(() => {
@@ -252,13 +254,13 @@ function movedInWords({ normal, offset_mm: wanted }, there) {
 }
 
 function tellAll(moved) {
-  const { state: { locked, search, cuts }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store);
+  const { state: { locked, search, cuts }, part, tab, line } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store);
   disable({ "find-others": Boolean(search) || !locked.some(Boolean) });
   hide({ plane: !plane, "plane-tools": !plane || tab !== "parts" || Boolean(search) });
   if (plane) {
     const [tilt, towards] = anglesOf(plane.normal);
     Object.entries({ offset: plane.offset_mm.toFixed(2), tilt: tilt.toFixed(1), towards: towards.toFixed(1) }).forEach(([name, value]) => fill($(`plane-${name}`), value));
-    document.querySelectorAll(":is(#plane, #plane-tools) :is(input, button:not(#lock))").forEach((control) => { control.disabled = isLocked(); });
+    document.querySelectorAll(":is(#plane, #plane-tools) :is(input, button)").forEach((control) => { control.disabled = line !== "open" || (isLocked() && control.id !== "lock"); });
     $("lock").className = isLocked() ? "icon-locked" : "icon-unlocked";
     pressed("lock", isLocked());
     hide({ limb: Boolean(plane.limbs_mm), "all-above": !plane.limbs_mm });

@@ -1,7 +1,6 @@
 // Print shown: a print's checks, its progress and its end, the bar on every tab, what is told outside the page, and its printer: by hand, by its camera, in a graph.
 
-import { $, duration, hide, listen, onData, optionsOf, roughly, rowOf, tell } from "../../../../view/template/elements.js";
-import { clock, listIn, putNew, putTable, tellIn } from "../lists.js";
+import { $, clock, duration, hide, listen, listIn, moment, onData, optionsOf, putNew, putTable, roughly, rowOf, tell, tellIn } from "../../../../view/template/elements.js";
 import { keptInTab } from "../store.js";
 
 const SILENT_MS = 5000; // a print that goes on is told five times a second
@@ -33,32 +32,16 @@ export function showWhich(prints, chosen) {
   $("which").value = chosen;
 }
 
-const BEFORE = { checking: "checking …", printing: "starting", cancelling: "ending" }; // any moment is known
-
-/** What stands above a print: how it is, or how it has ended. */
-function stateOf(print) {
-  const { state, starts } = print;
-  if (print.is_over) return print.sentence;
-  if (print.live) return stateTold(print);
-  if (state === "uploading") return print.message || "handing the file over";
-  return state === "ready" ? (starts ? "ready to print" : "ready to be handed over") : BEFORE[state] || "";
-}
+const howTold = (print) => [silence(print), print.how].filter(Boolean).join(" · ");
 
 export function showPrint(print, commands) {
   hide({ run: !print });
   if (!print) return void ($("printer-field").open = true);
-  const { state, is_over: over, is_away: paused, live, figures, server, starts, resumes } = print, uploads = state === "uploading";
+  const { state, is_over: over, is_away: paused, live, figures, server } = print, uploads = state === "uploading";
   const runs = print.is_printing || state === IN_HAND, asking = !runs && !uploads && (!over || state === "refused");
   const commanded = print.is_printing && state !== "cancelling" && commands;
-  tell({
-    "run-title": `${resumes ? "the rest of " : ""}${print.name} at ${print.port === "sim" ? "the simulated printer" : print.port}`, "run-state": stateOf(print),
-    "run-news": `${print.name}: ${over ? print.sentence : [state, print.warning].filter(Boolean).join(": ")}`, // a reader need not hear every per cent
-    "ask-told": print.question || (starts ? "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
-      : "The server keeps the file; nothing prints before somebody starts it there."),
-    "begin": resumes ? "Yes, go on" : starts ? "Print now" : "Hand it over", "leave": resumes ? "No, leave it" : "Not now", "pause": paused ? "Resume" : "Pause",
-    "sure-told": `Cancel this print? ${server ? "The server ends it, as its own macros say." : "The heaters go off, and what is printed stays as it is."}`,
-    "held-told": print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.",
-  });
+  const held = print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.";
+  tell({ ...print.texts, "run-state": howTold(print), "held-told": held });
   hide({
     "run-ask": state !== "ready" || !commands, "run-live": !live && !uploads, "run-upload": !uploads || !commands, "leave-printing": !server,
     "run-commands": !commanded, "held": over || commands, "words-line": !print.words.length, "run-log": !print.log, "forget": !over || !commands,
@@ -67,7 +50,7 @@ export function showPrint(print, commands) {
   $("run-state").className = over ? state : "";
   $("pause").dataset.print = paused ? "resume" : "pause";
   $("run-log").href = `prints/${print.number}/log`;
-  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on anyway` : text)), ...(figures && !over ? [figuresTold(figures)] : [])] : []);
+  listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on anyway` : text)), ...(figures && !over ? [figures.text] : [])] : []);
   listIn("run-findings", asking && figures ? figures.findings : []);
   listIn("run-words", print.words.slice(-FEW));
   listIn("run-said", runs || uploads || over ? print.said.filter((line) => line && (!print.log || !line.includes(print.log))).slice(-FEW) : []);
@@ -78,14 +61,6 @@ export function showPrint(print, commands) {
   shownState = kind;
   if (over && print.forcible && commands) hide({ "force-line": false });
 }
-
-function stateTold(print) {
-  const { state, share, left_s: left, message, warning } = print;
-  return [silence(print), share ? `${state}, ${Math.floor(100 * share)} %` : state, left ? `${duration(left)} left` : "", message, warning].filter(Boolean).join(" · ");
-}
-
-const figuresTold = ({ lines, time_s: time, filament_mm: filament, filament_g: grams, costs, errors }) =>
-  `${lines} lines, ${duration(time)}, ${(filament / 1000).toFixed(2)} m (${grams.toFixed(1)} g${costs ? `, ${costs}` : ""}) of filament${errors ? `, ${errors} error${errors === 1 ? "" : "s"} in the dry run` : ""}`;
 
 /** How long ago a moment was, in seconds since 1970. */
 function ago(moment_s) {
@@ -120,8 +95,7 @@ export function showProgress(print) {
 
 /** What is told of a print of before, in this order. */
 export const pastCells = ({ name, outcome, seconds, filament_m: metres, begun }) => [
-  name, outcome, seconds == null ? "–" : roughly(seconds), metres == null ? "–" : `${metres.toFixed(1)} m`,
-  new Date(1000 * begun).toLocaleString([], { dateStyle: "short", timeStyle: "short" })];
+  name, outcome, seconds == null ? "–" : roughly(seconds), metres == null ? "–" : `${metres.toFixed(1)} m`, moment(begun)];
 
 export function showHistory(prints = []) {
   hide({ "history-field": !prints.length });
@@ -133,26 +107,17 @@ export function showBar(running, looked) {
   const shown = running.includes(looked) ? looked : running.at(-1);
   hide({ "bar-told": !shown, "emergency": !shown, "print-bar": !shown && $("stop-told").hidden });
   if (!shown) return;
-  tell({ "bar-told": `${shown.name} at ${shown.port}: ${stateTold(shown)}` });
+  tell({ "bar-told": `${shown.name} at ${shown.port}: ${howTold(shown)}` });
   $("emergency").dataset.print = shown.number;
 }
 
-let model = "", percent = null;
+const titled = { model: "", share: null };
 const heard = new Map(); // whether it runs, by the number of a print that this page commands
 
-const tellTitle = () => { document.title = [percent === null ? "" : `${percent} %`, model, "tiltprint"].filter(Boolean).join(" – "); };
-
-/** The model's name in the title. */
-export function titleOfModel(name) {
-  model = name;
-  tellTitle();
-}
-
-/** How far the newest print that runs is, in the title; null: none runs. */
-export function titleOfPrints(running) {
-  const share = running.at(-1)?.share;
-  percent = running.length && share != null ? Math.floor(100 * share) : null;
-  tellTitle();
+/** The tab's title has the model's name, and the share that is done of the newest print that runs; null: none runs. */
+export function tellTitle(news) {
+  const { model, share } = Object.assign(titled, news);
+  document.title = [share == null ? "" : `${Math.floor(100 * share)} %`, model, "tiltprint"].filter(Boolean).join(" – ");
 }
 
 /** Asked as a print begins, for a hand has just pressed a button: may the browser say when it is over? */
@@ -188,21 +153,15 @@ const EVERY_MS = 2000;
 /** A picture of the camera at a print server, anew every two seconds while it is looked at: of print(). It comes through the workbench, for
  * the page loads nothing from elsewhere. */
 export function webcamPanel(print) {
-  let shown = "", asking = false;
-  const show = (address) => {
-    hide({ "webcam-line": !address });
-    if (address) $("webcam").src = address;
-    if (shown) URL.revokeObjectURL(shown);
-    shown = address;
-  };
-  setInterval(async () => {
-    const job = print();
-    if (!job?.webcam || job.is_over) return show("");
-    if (asking || document.hidden || $("printing").hidden) return;
-    asking = true;
-    const answer = await fetch(`prints/${job.number}/webcam`).catch(() => null), picture = answer?.ok ? await answer.blob().catch(() => null) : null;
-    asking = false;
-    show(picture && print()?.number === job.number ? URL.createObjectURL(picture) : "");
+  const picture = $("webcam"), show = (whether) => hide({ "webcam-line": !whether });
+  const filmed = () => (print()?.webcam && !print().is_over ? print().number : 0);
+  let asked = 0; // the print whose picture is there, or on its way
+  Object.assign(picture, { onload: () => show(filmed() === asked), onerror: () => show(false) });
+  setInterval(() => {
+    if (!filmed()) return show(false);
+    if (document.hidden || $("printing").hidden || !picture.complete) return;
+    asked = filmed();
+    picture.src = `prints/${asked}/webcam?${Date.now()}`;
   }, EVERY_MS);
 }
 

@@ -1,30 +1,30 @@
-// Clicks: what the next click on the model is for, and what it does.
+// Clicks: what the next click on the model is for, and what it does; the cross in the corner of the picture, which tells where x, y and z are
+// and looks along the one that is clicked; and the section view, the inside of the model, seen where a plane cuts it away.
 
-import { $, disable, listen, notice, numberIn, onKeys, pressed, toggle } from "../../../../view/template/elements.js";
+import { $, listen, notice, numberIn, onKeys, pressed, toggle } from "../../../../view/template/elements.js";
+import { cross, dot } from "../../../../view/template/picture/math.js";
+import { sectionAsked } from "../../../../view/template/picture/shapes.js";
 import { layFacet } from "../model/model.js";
 import { markAt, markWord } from "../parts/marks-panel.js";
 import { openMenu } from "../parts/parts-panel.js";
 import { apartNow, pieceMet, shiftsOf } from "../parts/pieces.js";
-import { choosePart, cutLimb, partAt, snapTo } from "../parts/planes.js";
+import { choosePart, cutLimb, partAt, planesNow, snapTo } from "../parts/planes.js";
 import { store, subscribe, update } from "../store.js";
-import { brushOf } from "./brush.js";
-import { measureOf } from "./measure.js";
+import { brushOf, measureOf } from "./tools.js";
 import { met } from "./triangles.js";
 
-const NEEDS_PICTURE = ["brush", "faces", "box", "measure"];
-/** Of what a click can be for: the button that asks for it, and what is said then. */
+/** Of what a click can be for: the button that asks for it, what is said then, and what it does where it meets the model. */
 const WANTED = {
-  lay: ["lay", () => "Click a lit face: it can rest on that."], snap: ["snap", () => "Click the face whose plane it is to take."],
-  limb: ["limb", () => "Click the limb above the plane that is to come off alone; the others stay."],
-  brush: ["mark-brush", () => `Paint ${markWord()}; Shift or the right button erases, [ and ] change the circle; Esc ends it.`],
-  faces: ["mark-faces", () => `Click where there is to be ${markWord()}; Esc ends it.`],
-  box: ["mark-box", () => (store.corner ? "Now the opposite corner." : "Click a corner of the box.")],
+  lay: ["lay", () => "Click a lit face: it can rest on that."], snap: ["snap", () => "Click the face whose plane it is to take.", ({ face }, picture) => snapTo(face, picture)],
+  limb: ["limb", () => "Click the limb above the plane that is to come off alone; the others stay.", ({ place }) => cutLimb(place)],
+  brush: ["mark-brush", () => `Paint where there is to be ${markWord()}; Shift or the right button erases, [ and ] change the circle; Esc ends it.`],
+  faces: ["mark-faces", () => `Click where there is to be ${markWord()}; Esc ends it.`, ({ place }) => markAt(place)],
+  box: ["mark-box", () => (store.corner ? "Now the opposite corner." : "Click a corner of the box."), ({ place }) => markAt(place)],
   measure: ["measure", () => "Click two points; corners attract. Esc ends it."],
 };
 
-export function clicksOf(picture) {
-  for (const [clicks, [id]] of Object.entries(WANTED)) listen("click", { [id]: () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null }) });
-  NEEDS_PICTURE.forEach((clicks) => disable({ [WANTED[clicks][0]]: !picture }));
+export function clicksOf() {
+  for (const [clicks, [id]] of Object.entries(WANTED)) listen("click", { [id]: () => update({ clicks: store.clicks === clicks ? "" : clicks, corner: null, apart: 0 }) });
   listen("click", { "mark-erase": () => pressed("mark-erase", $("mark-erase").getAttribute("aria-pressed") !== "true") });
   listen("change", { "mark-kind": () => update({ corner: null }) });
   subscribe((now, before) => {
@@ -69,11 +69,8 @@ export function handsOf(camera, picture) {
     options[next % options.length].selected = true;
     $("section-along").dispatchEvent(new Event("change"));
   };
-  const tool = (id, tab) => () => {
-    if (tab) $(tab).click();
-    $(id).click();
-  };
-  onKeys({ b: tool("mark-brush", "tab-parts"), m: tool("measure"), x: nextSection, "[": widen(1 / 1.2), "]": widen(1.2) },
+  const clickAll = (...ids) => () => ids.forEach((id) => $(id).click());
+  onKeys({ b: clickAll("tab-parts", "mark-brush"), m: clickAll("measure"), x: nextSection, "[": widen(1 / 1.2), "]": widen(1.2) },
     () => $("keys").open || !store.triangles || document.activeElement?.closest("[data-typing]"));
   globalThis.view = { camera, picture }; // for whoever tries the page from a console
   const asked = (event) => {
@@ -89,10 +86,61 @@ function press(event, picture) {
   const { clicks, tab } = store;
   if (!clicks || apartNow()) return void (tab === "parts" && choosePart(partMet(event, picture)));
   if (clicks === "lay") return layFacet(picture, event);
-  const spot = clicks === "brush" ? null : met(event, picture);
-  if (!spot) return;
-  if (clicks === "snap") snapTo(spot.face, picture);
-  else if (clicks === "limb") cutLimb(spot.place);
-  else markAt(spot.place);
+  const [, , act] = WANTED[clicks], spot = act && met(event, picture);
+  if (spot) act(spot, picture);
 }
 
+const REACH_PX = 26;
+/** Of every end of an axis: its direction, and from where it is looked at, yaw and pitch in degrees. */
+const ENDS = {
+  "x": [[1, 0, 0], [0, 0]], "-x": [[-1, 0, 0], [180, 0]], "y": [[0, 1, 0], [90, 0]], "-y": [[0, -1, 0], [-90, 0]], "z": [[0, 0, 1], [-90, 89.5]], "-z": [[0, 0, -1], [-90, -89.5]],
+};
+
+/** The cross, drawn with the picture; a click turns the view. */
+export function axesOf(camera, picture) {
+  const group = $("axes");
+  const ends = Object.fromEntries([...group.querySelectorAll("[data-end]")].map((end) => [end.dataset.end, end]));
+  let seen = "";
+  const look = (name) => {
+    camera.lookFrom(...ENDS[name][1]);
+    picture.ask();
+  };
+  for (const [name, end] of Object.entries(ends)) {
+    end.addEventListener("click", () => look(name));
+    end.addEventListener("keydown", (event) => { if (["Enter", " "].includes(event.key)) { event.preventDefault(); event.stopPropagation(); look(name); } });
+  }
+  picture.drawn.push(() => {
+    const now = `${camera.yaw} ${camera.pitch}`;
+    if (now === seen) return;
+    seen = now;
+    const [right, up] = [camera.right(), camera.up()], out = cross(right, up), near = (name) => dot(out, ENDS[name][0]);
+    for (const [name, [way]] of Object.entries(ENDS)) {
+      const place = `${(REACH_PX * dot(right, way)).toFixed(1)} ${(-REACH_PX * dot(up, way)).toFixed(1)}`;
+      ends[name].setAttribute("transform", `translate(${place})`);
+      $(`axis-${name}`)?.setAttribute("d", `M0 0L${place}`);
+    }
+    const order = Object.keys(ENDS).sort((a, b) => near(a) - near(b)); // those behind first
+    if (group.dataset.order === order.join() || group.contains(document.activeElement)) return; // moved, an end would lose the keyboard
+    group.dataset.order = order.join();
+    group.append(...order.map((name) => ends[name]));
+  });
+  group.removeAttribute("hidden");
+}
+
+export function sectionView(picture) {
+  const show = () => {
+    const cut = planesNow()[store.part - 2] || null;
+    $("section-cut").disabled = !cut;
+    picture.section(store.triangles ? sectionAsked(picture.box(), cut) : null);
+  };
+  listen("input", { "section-at": show });
+  const open = () => { // towards the eye
+    $("section-at").value = 0;
+    $("section-flip").checked = false;
+    show();
+    $("section-flip").checked = !picture.cutAway(picture.eye());
+    show();
+  };
+  listen("change", { "section-flip": show, "section-along": open });
+  subscribe(show);
+}

@@ -5,33 +5,33 @@ import { add } from "../../../../view/template/picture/math.js";
 
 const ARROWS = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 };
 
-/** An element that is dragged: take(event) gives what is held, null: not now; move(held, event) follows the hand; put(held) ends
- * it, and arrow keys that are let go, drop(held) leaves all as it was (Escape, a lost pointer). step(sign, event): an arrow key. */
-export function gripOf(element, { take, move, put, drop, step }) {
-  let held = null, stepping = false;
-  const end = (act) => (event) => {
-    const last = held;
-    held = null;
-    if (last) act(last, event);
+/** An element that is dragged: take(event) gives what follows the hand, a function of later events, null: not now; hold(what that gives) shows
+ * it; put() ends it, and arrow keys that are let go, drop() leaves all as it was (Escape, a lost pointer). step(sign, event): what an arrow key gives. */
+export function gripOf(element, { take, hold, put, drop, step }) {
+  let follow = null, stepping = false;
+  const end = (act) => () => {
+    const followed = follow;
+    follow = null;
+    if (followed) act();
   };
   element.addEventListener("pointerdown", (event) => {
-    if (event.button || held) return;
-    held = take(event);
-    if (held) element.setPointerCapture(event.pointerId);
+    if (event.button || follow) return;
+    follow = take(event);
+    if (follow) element.setPointerCapture(event.pointerId);
   });
-  element.addEventListener("pointermove", (event) => { if (held) move(held, event); });
+  element.addEventListener("pointermove", (event) => { if (follow) hold(follow(event)); });
   element.addEventListener("pointerup", end(put));
   element.addEventListener("pointercancel", end(drop));
   element.addEventListener("keydown", (event) => {
-    if (event.key === "Escape" && held) {
+    if (event.key === "Escape" && follow) {
       event.stopPropagation();
-      return end(drop)(event);
+      return end(drop)();
     }
-    if (!(event.key in ARROWS) || held) return;
+    if (!(event.key in ARROWS) || follow) return;
     event.preventDefault();
     event.stopPropagation();
     stepping = true;
-    step(ARROWS[event.key], event);
+    hold(step(ARROWS[event.key], event));
   });
   const letGo = () => { if (stepping) [stepping] = [false, put()]; };
   element.addEventListener("keyup", (event) => { if (event.key in ARROWS) letGo(); });

@@ -1,11 +1,10 @@
 // Picture: the table and the model on it, red where it overhangs or in the colours of its parts.
 
 import { alike, nextFrame } from "../../../../view/template/elements.js";
-import { cameraOf, placeOn } from "../../../../view/template/picture/camera.js";
+import { cameraOf, HALF_HEIGHT, placeOn } from "../../../../view/template/picture/camera.js";
 import { cardOf, frameOf, outgrown, outlive, sizeOf } from "../../../../view/template/picture/gl.js";
-import { add, bounds, carried, cornersOf, dot, IDENTITY, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
-import { bodiesOf, boxEdges, cutsOf, FROM_BELOW, ON_PLATE, planesOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
-import { bodyOf, clipOf, MOST_CUTS, solidOf } from "../../../../view/template/picture/solids.js";
+import { add, bounds, carried, cornersOf, dot, IDENTITY, length, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
+import { bodiesOf, bodyOf, boxEdges, clipOf, cutsOf, FROM_BELOW, MOST_CUTS, ON_PLATE, planesOf, solidOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { markedOver } from "../parts/marks-panel.js";
 import { piecesOn } from "../parts/pieces.js";
 import { paintedRed, planeBefore, standingBy } from "./triangles.js";
@@ -14,10 +13,10 @@ const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156], PLANE_C
 const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
 const MOST_FACES = 2000000; // of all copies together; those beyond are drawn as boxes
 const ON_SECTION_MM = 1e-3;
-const ON_FACES = 1e-4; // in depth, by which lines are seen before what they lie on
+const ON_FACES = 1e-4; // in depth, by which lines are seen before what they lie on, and what is cut away before the plate
 
 /** Corners of boxes about all that is drawn but the table, the model in the middle of that: the model and its copies, or its parts, and walls, planes, marks and what is in the way. */
-export function placesDrawn({ box, place = [0, 0, 0], copies = [], pieces, shifts, walls, pedestal, extras }) {
+export function placesDrawn({ box, place = [0, 0, 0], middle = place, copies = [], pieces, shifts, walls, pedestal, others, extras }) {
   const shifted = (box, shift) => box.map((corner) => add(corner, shift));
   const stood = () => [
     ...[...(walls || []).values()].map(({ places }) => shifted(bounds(places), scaled(place, -1))), pedestal ? bounds(pedestal.vertices) : [],
@@ -26,6 +25,7 @@ export function placesDrawn({ box, place = [0, 0, 0], copies = [], pieces, shift
   const whole = pieces ? pieces.parts.map((part, k) => shifted(part.box, shifts[k])) : stood();
   const around = Object.values(extras).flat().flatMap(({ solid, lines, matrix = IDENTITY }) => [solid, lines].filter((shape) => shape?.places.length)
     .flatMap(({ places }) => cornersOf(bounds(places)).map((place) => carried(matrix, place))));
+  if (others) whole.push(shifted(bounds(others.vertices), sub(middle, place)));
   return [...whole.filter((box) => box.length).flatMap(cornersOf), ...around];
 }
 
@@ -51,8 +51,8 @@ export function pictureOf(canvas, camera) {
   const gl = cardOf(canvas);
   if (!gl) return null;
   const scene = {
-    model: null, matrix: IDENTITY, place: [0, 0, 0], copies: [], box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, marks: null, pieces: null, shifts: [], chosen: 0,
-    walls: null, section: null, pedestal: null, machine: null, dark: false, extras: {},
+    model: null, matrix: IDENTITY, place: [0, 0, 0], middle: [0, 0, 0], copies: [], box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, marks: null, pieces: null, shifts: [], chosen: 0,
+    walls: null, section: null, pedestal: null, others: null, machine: null, dark: false, extras: {},
   };
   const drawn = [], toldOf = {}, stale = new Map(); // by the name of what is to be made anew before it is drawn: whether its colours alone are others
   let card = {}, frame = null, colours = null, count = 0, placed = "";
@@ -64,7 +64,7 @@ export function pictureOf(canvas, camera) {
   const makers = {
     table: () => bodyOf(gl, scene.machine ? bodiesOf(scene.machine, scene.dark).table : {}),
     model: () => scene.model && solidOf(gl, { places: scene.model.corners, colours: inks.model() }),
-    pedestal: () => scene.pedestal && solidOf(gl, { places: scene.pedestal.corners, colours: paintedRed(scene.pedestal.count, null, PEDESTAL_COLOUR) }),
+    ...Object.fromEntries(["pedestal", "others"].map((name) => [name, () => scene[name] && solidOf(gl, { places: scene[name].corners, colours: paintedRed(scene[name].count, null, PEDESTAL_COLOUR) })])),
     pieces: () => scene.pieces && piecesOn(gl, scene.pieces, scene.chosen),
     walls: (before) => wallsOn(gl, scene.walls, before),
   };
@@ -84,7 +84,7 @@ export function pictureOf(canvas, camera) {
     if (gl.isContextLost()) return;
     renew();
     const size = sizeOf(canvas), plate = camera.seen(size), seenAs = (matrix) => plate(multiply(moved(scene.place), matrix)), below = camera.eye()[2] < 0;
-    const flat = seenAs(IDENTITY), ground = plate(IDENTITY), ghost = scene.walls ? FAINT : 0, open = clipOf(flat.toEye, scene.section), capped = { ...open, capped: Boolean(scene.section) && !ghost };
+    const flat = seenAs(IDENTITY), ground = plate(IDENTITY), ghost = scene.walls ? FAINT : 0, open = { ...clipOf(flat.toEye, scene.section), lift: scene.section ? ON_FACES : 0 }, capped = { ...open, capped: Boolean(scene.section) && !ghost };
     if (outgrown(canvas)) [canvas.width, canvas.height] = size;
     frame.begin(...size);
     if (!below) card.table.draw(ground, { lift: ON_PLATE });
@@ -96,6 +96,7 @@ export function pictureOf(canvas, camera) {
         card.pedestal?.draw(seenAs(moved(shift)), { ghost, ...capped });
       }
     }
+    card.others?.draw(plate(moved(scene.middle)), { ghost, ...capped });
     if (below) card.table.draw(ground, { ...FROM_BELOW, lift: ON_PLATE });
     Object.keys(scene.extras).forEach((name) => card[name].draw(seenAs));
     frame.show();
@@ -173,14 +174,14 @@ export function pictureOf(canvas, camera) {
       const { discs, rims } = planesOf(plane ? [{ base: plane, direction: plane.normal }] : [], () => PLANE_COLOUR);
       return [{ solid: discs, lines: rims, strength: 0.3 }];
     }),
-    /** The triangles of what the model stands on, in the platform's frame, or none. */
-    pedestal: take("pedestal"),
-    /** Where the middle of all that is drawn but the walls stands on the plate, and its copies, from there. */
-    place(place, copies) {
-      const told = JSON.stringify([place, copies, scene.box]);
+    /** The triangles of what the model stands on, in the platform's frame, and of the other models, from the middle of all, or none. */
+    pedestal: take("pedestal"), others: take("others"),
+    /** Where the middle of all that is drawn but the walls and the other models stands on the plate, its copies, from there, and the middle of all. */
+    place(place, copies, middle) {
+      const told = JSON.stringify([place, copies, middle, scene.box]);
       if (told === placed) return;
       placed = told;
-      Object.assign(scene, { place, copies });
+      Object.assign(scene, { place, copies, middle });
       const boxes = copies.slice(bodies()).flatMap((shift) => boxEdges(...scene.box.map((corner) => add(corner, shift))));
       extra("copies", boxes.length ? told : "", () => (boxes.length ? [{ lines: trianglesOf([{ corners: boxes, colour: [...MODEL_COLOUR, 255] }]) }] : []));
       ask();
@@ -202,6 +203,8 @@ export function pictureOf(canvas, camera) {
       ask();
     },
     eye: () => sub(camera.eye(), scene.place),
+    /** mm that a pixel shows at a place. */
+    pixelAt: (place) => (2 * HALF_HEIGHT * length(sub(camera.eye(), add(place, scene.place)))) / canvas.clientHeight,
     carried: (place) => carried(scene.matrix, place),
     box: () => scene.box,
     matrix: () => scene.matrix,

@@ -1,7 +1,7 @@
 // Triangles: the model as it is read, and what of it overhangs for a rotation.
 
 import { add, bounds, carried, cross, dot, length, mix, multiply, RAD, rotated, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
-import { RED, wordOf } from "../../../../view/template/picture/solids.js";
+import { RED, wordOf } from "../../../../view/template/picture/shapes.js";
 import { apartNow } from "../parts/pieces.js";
 import { store } from "../store.js";
 import { cornersAt, faceMet } from "./face-tree.js";

@@ -1,9 +1,8 @@
 // Settings panel: the profile's own keys in groups that fold, for beginners or for all, searched by a word; of all parts or of one; what is
 // changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
 
-import { $, button, disable, hide, listen, made, numberIn, optionsOf, pressed, tell } from "../../../../view/template/elements.js";
-import { ask, send } from "../line.js";
-import { putNew, putRows } from "../lists.js";
+import { $, button, disable, hide, listen, made, numberIn, optionsOf, pressed, putNew, putRows, tell } from "../../../../view/template/elements.js";
+import { ask, newest, send } from "../line.js";
 import { keptInTab, onNew, onState, store } from "../store.js";
 
 const LEVELS = ["simple", "advanced", "all"]; // each has the keys of those before it
@@ -14,7 +13,7 @@ const kept = keptInTab("settings", { level: "simple", folded: [] });
 export function settingsPanel() {
   const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
   const explained = new Set();
-  let settings = [], missed = false, changedOnly = false, fetches = 0; // missed: they have not come
+  let settings = [], changedOnly = false;
   const part = () => numberIn("settings-part") || 0;
   const set = (key, value, typed) => {
     const of = part();
@@ -62,15 +61,18 @@ export function settingsPanel() {
     pressed("only-changed", only);
     list();
   };
-  const fetchAll = async () => {
-    const number = ++fetches, told = await fetch(`settings.json?part=${part()}`).then((answer) => (answer.ok ? answer.json() : {}), () => null);
-    missed = !told; // the line is lost: the next state asks again
-    if (!told?.settings || number !== fetches) return; // a later question has the newer answer
+  const take = (told) => {
+    if (!told) return;
     settings = told.settings;
     showProfiles(told.profiles);
     putNew($("command-line"), told.command, () => told.command.split(/ (?=-)/).flatMap((text, k) => [k ? " " : "", made("span", { text })]));
     hide({ "command-field": !told.command });
     list();
+  };
+  const fetchNewest = newest({ read: (answer) => answer.json(), take });
+  const fetchAll = () => {
+    const { given, part_settings: own, parts, model, rotation, stops, copies, beside } = store.state;
+    fetchNewest(JSON.stringify([part(), [...wrongs.keys()], given, own, parts, model?.name, rotation, stops, copies, beside]), `settings.json?part=${part()}`);
   };
   const partsToChoose = ({ parts, part_settings: own, model }) => {
     const names = ["all parts", ...Array.from({ length: model ? Math.max(parts, 1) : 0 }, (_, k) => {
@@ -92,13 +94,10 @@ export function settingsPanel() {
   });
   for (const level of LEVELS) listen("click", { [`level-${level}`]: () => keep({ level }) });
   for (const kind of KINDS) listen("click", { [`reset-${kind}`]: () => send({ do: "reset", kind }) });
-  onNew(({ given, part_settings: own, parts, model, rotation, stops, copies }) => [given, own, parts, model?.name, rotation, stops, copies], () => {
-    partsToChoose(store.state);
-    fetchAll();
-  });
+  onNew(({ parts, part_settings: own, model }) => ({ parts, part_settings: own, model: Boolean(model) }), partsToChoose);
   onState(() => {
     tellBeside();
-    if (missed) fetchAll();
+    fetchAll();
   });
 }
 
@@ -160,12 +159,12 @@ async function copyText(element, button) {
 /** wrong: {text, typed}, what was refused last; set(key, value, typed) asks for a value, null: as it was; again(): called when a person
  * leaves what was typed in, for what has been told meanwhile; explained: the keys whose meaning is shown. */
 function settingRow(setting, { wrong, set, again, explained }) {
-  const { key, label, unit, kind, value, changed, placeholders = [] } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
-  const meaning = made("small", { text: meaningOf(setting), id: `meaning-${key}`, hidden: !explained.has(key) });
+  const { key, label, unit, kind, value, changed, was, placeholders = [] } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
+  const meaning = made("small", { text: setting.meaning, id: `meaning-${key}`, hidden: !explained.has(key) });
   const refused = made("small", { className: "wrong", text: wrong ? wrong.text : "", role: "alert", hidden: !wrong });
   input.setAttribute("aria-describedby", meaning.id);
   input.setAttribute("aria-invalid", Boolean(wrong));
-  const was = wasOf(setting), back = button("↺", () => set(key, null), { title: was, ariaLabel: `${label}: ${was}`, hidden: !changed && !wrong });
+  const back = button("↺", () => set(key, null), { title: was || "Reset to the profile", ariaLabel: `${label}: ${was}`, hidden: !changed && !wrong });
   const turn = () => {
     meaning.hidden = !meaning.hidden;
     explain.ariaExpanded = String(!meaning.hidden);
@@ -186,19 +185,6 @@ function settingRow(setting, { wrong, set, again, explained }) {
     again();
   });
   return row;
-}
-
-/** What a key means and what it may be, as a sentence. */
-function meaningOf({ meaning, least, most }) {
-  const range = least !== null || most !== null ? ` (${least ?? "…"} to ${most ?? "…"})` : "";
-  return `${meaning.charAt(0).toUpperCase()}${meaning.slice(1)}${range}.`;
-}
-
-/** What a key has without the change, where that is short enough to be read. */
-function wasOf({ unchanged, unit, kind }) {
-  if (kind === "block" || kind === "rows") return "Reset to the profile";
-  const value = unchanged === null || unchanged === "" ? "nothing" : unchanged === true ? "on" : unchanged === false ? "off" : `${unchanged} ${unit}`.trim();
-  return `Profile value: ${value}`;
 }
 
 function inputOf({ kind, choices, least, most }, value) {

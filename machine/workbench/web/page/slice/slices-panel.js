@@ -1,10 +1,10 @@
-// Slices panel: copies and pauses, the parts sliced and their walls in the picture, what the print takes, what the dry run complains of, and what one piece would cost.
+// Slices panel: copies and pauses, the parts sliced and their walls in the picture, what the print takes, what the dry run complains of, what one piece
+// would cost, and all that is saved of a bench, in one menu.
 
-import { $, disable, findingButton, hide, listen, made, numberIn, rowOf, sayIn, swatch, tell, toggle } from "../../../../view/template/elements.js";
+import { $, disable, fill, findingButton, hide, listen, listIn, made, numberIn, onData, putTable, removeButton, rowOf, sayIn, swatch, tell, tellIn, toggle } from "../../../../view/template/elements.js";
 import { cross, scaled, sub, unit } from "../../../../view/template/picture/math.js";
-import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/solids.js";
-import { send } from "../line.js";
-import { listIn, putTable, removeButton, tellIn } from "../lists.js";
+import { PLAIN, rgb, wordOf } from "../../../../view/template/picture/shapes.js";
+import { save, send } from "../line.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 
 export function slicesPanel(showFinding) {
@@ -73,21 +73,17 @@ export function stopsPanel() {
     send({ do: "add_stop", kind: $("stop-kind").value, at: $("stop-at").value });
   } });
   onState(({ copies, copies_told: told, problem }, before) => {
-    tell({ "copies-told": told });
-    if (copies !== before?.copies || (problem && problem !== before?.problem) || document.activeElement !== $("copies")) $("copies").value = copies;
+    tell({ "copies-told": told, "plate-told": told });
+    fill($("copies"), copies, copies !== before?.copies || (problem && problem !== before?.problem));
   });
   onNew(({ stops }) => stops, (stops) => {
     if (adding) $("stop-at").value = "";
     adding = false;
     const held = $("stops").contains(document.activeElement);
-    putTable($("stops"), stops, [], () => stops.map((stop, k) => stopRow(stop, () => send({ do: "remove_stop", number: k + 1 }))));
+    putTable($("stops"), stops, [], () => stops.map(({ kind, where }, k) => (
+      rowOf([kind, where, removeButton(`Remove the ${kind} of ${where}`, () => send({ do: "remove_stop", number: k + 1 }))]))));
     if (held) $("stop-at").focus(); // the row that had the focus is gone
   });
-}
-
-function stopRow({ part, layer, height_mm: height, change }, remove) {
-  const kind = change ? "filament change" : "pause", where = layer === null ? `part ${part}, at ${height} mm` : `part ${part}, before layer ${layer}`;
-  return rowOf([kind, where, removeButton(`Remove the ${kind} of ${where}`, remove)]);
 }
 
 export function comparePanel() {
@@ -141,4 +137,20 @@ export function wallsOf(picture) {
     picture.walls(shown ? store.walls : null);
     document.documentElement.dataset.walls = shown ? [...store.walls.keys()].sort((a, b) => a - b).join(" ") : "";
   });
+}
+
+/** What is not there yet says why. */
+export function saveMenu() {
+  const confirm = () => {
+    const { errors } = store.state.sliced;
+    tell({ "errors-title": `The dry run found ${errors.length} error${errors.length === 1 ? "" : "s"}` });
+    listIn("errors-list", errors.slice(0, 3));
+    $("save-anyway").showModal();
+  };
+  onData("save", ({ save: address }) => save(address));
+  listen("click", { "save-gcode": () => (store.state.sliced.errors.length ? confirm() : save("print.gcode")), "save-errors": () => save("print.gcode?force=yes") });
+  onNew(({ savable }) => savable, (savable) => Object.entries(savable).forEach(([name, [why, words]]) => {
+    disable({ [`save-${name}`]: Boolean(why) });
+    $(`save-${name}`).querySelector("small").textContent = why || words;
+  }));
 }

@@ -1,0 +1,162 @@
+"""Several models on the plate of the workbench: how they get there, that they are printed as by the command line, and kept."""
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from shlex import split
+from typing import Any
+
+import numpy as np
+import pytest
+
+from machine.cli.cli import main
+from machine.workbench.bench.bench import Bench, History, Step, with_beside
+from machine.workbench.bench.settings import export_command
+from mdp.save import stl
+from profiles.errors import PlanError
+from profiles.profile import load
+from tests.machine.running_workbench import QUICK, Page, Running, workbench
+from tests.machine.workbench.models import changed, changed_bench, model
+from tests.shapes import box, tee
+
+
+@pytest.fixture(scope="module")
+def bench() -> Iterator[Running]:
+    with workbench(*QUICK) as running:
+        yield running
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tee.stl").write_bytes(stl(tee()))
+    (tmp_path / "box.stl").write_bytes(stl(box(8, 8, 2)))
+    return tmp_path
+
+
+def two(copies: int = 1) -> Bench:
+    """A tee, or several, with two boxes beside it."""
+    return with_beside(Bench(load(), model(), copies=copies), ((model("box.stl"), 2),))
+
+
+def on_plate(state: dict[str, Any]) -> list[tuple[str, int]]:
+    return [(other["name"], other["copies"]) for other in state["beside"]]
+
+
+def test_the_number_of_another_model_is_changed_and_zero_removes_it() -> None:
+    steps = History(Step("", two()))
+    assert changed(steps, "beside", number=1, count=3).now.bench.beside[0][1] == 3
+    without = changed(steps, "beside", number=1, count=0)
+    assert (without.now.bench.beside, without.undo().now.bench.beside) == ((), steps.now.bench.beside)
+    with pytest.raises(PlanError, match="number is 2: 1 to 1 is allowed"):
+        changed(steps, "beside", number=2, count=1)
+
+
+def test_a_model_is_on_the_plate_once_and_a_plate_has_at_most_a_thousand() -> None:
+    with pytest.raises(PlanError, match=r"tee\.stl is on the plate already: set its number of copies to print more"):
+        with_beside(two(), ((model(), 1),))
+    with pytest.raises(PlanError, match="1001 models are to stand on the plate: 1000 at most are allowed"):
+        changed_bench(two(), "copies", count=999)
+
+
+def test_the_other_models_stay_when_the_first_is_turned_and_decide_the_print_but_not_its_parts() -> None:
+    plate = two()
+    turned = changed_bench(plate, "turn", axis="z", deg=30)
+    alone = changed_bench(turned, "beside", number=1, count=0)
+    assert turned.beside == plate.beside
+    assert (turned.sought == alone.sought, turned.printed == alone.printed) == (True, False)
+
+
+def test_the_command_line_names_every_model_with_its_copies_and_the_plan_of_the_first() -> None:
+    assert export_command(two(copies=3)) == "tiltprint export tee.stl:3 box.stl:2 --plan tee-plan.toml -o tee.gcode"
+
+
+def add(bench: Running, file: Path) -> tuple[int, bytes]:
+    """A file as a page of this server sends it to be put on the plate."""
+    return bench.ask(f"file?name={file.name}&add=yes", "POST", file.read_bytes(), Origin=f"http://127.0.0.1:{bench.port}")
+
+
+def sliced(page: Page) -> dict[str, Any]:
+    page.do("slice")
+    return page.until(lambda state: state["sliced"] and not state["sliced"]["stale"] and not state["slicing"])
+
+
+def drawn(bench: Running, state: dict[str, Any]) -> tuple[int, float]:
+    """Number of faces and height of what is drawn of the other models, mm."""
+    content = bench.ask(f"others/{state['others']}")[1]
+    points, faces = np.frombuffer(content, "<u4", 2)
+    vertices = np.frombuffer(content, "<f8", 3 * points, 8).reshape(-1, 3)
+    return int(faces), round(float(vertices[:, 2].max()), 6)
+
+
+def test_the_g_code_of_a_plate_is_that_of_the_command_line_and_the_plate_is_kept(
+    bench: Running, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with bench.line() as page:
+        bench.send(folder / "box.stl")
+        assert add(bench, folder / "tee.stl")[0] == 200
+        page.until(lambda state: on_plate(state) == [("tee.stl", 1)])
+        page.do("beside", number=1, count=2)
+        page.do("turn", axis="z", deg=30)
+        state = page.until(lambda state: state["copies_told"] == "All 3 stand on the plate." and state["others"])
+        assert drawn(bench, state) == (2 * len(tee().faces), 40.0)
+        sliced(page)
+        laid = page.until(lambda now: now["others"] not in (None, state["others"]))
+        assert drawn(bench, laid) == (2 * len(tee().faces), 10.0)  # on its front, where nothing hangs over
+        command = json.loads(bench.ask("settings.json?part=0")[1])["command"]
+        assert command.startswith("tiltprint export box.stl tee.stl:2 --")
+        assert command.endswith(" --plan box-plan.toml -o box.gcode")
+        (folder / "box-plan.toml").write_bytes(bench.ask("plan.toml")[1])
+        assert main(split(command)[1:]) == 0
+        gcode = bench.ask("print.gcode")[1]
+        assert gcode == (folder / "box.gcode").read_bytes()
+        project = folder / "plate.3mf"
+        project.write_bytes(bench.ask("project.3mf")[1])
+        assert main(["export", "plate.3mf", "-o", "again.gcode"]) == 0
+        assert (folder / "again.gcode").read_bytes() == gcode
+        assert main(["export", "plate.3mf", "--copies", "2", "-o", "again.gcode"]) == 1
+        assert "plate.3mf says how many of each model stand on its plate" in capsys.readouterr().err
+        page.do("compare")
+        page.until(lambda state: len(state["compared"]) > 1)
+        assert main(["save", "plate.3mf", "-o", "saved.3mf"]) == 0
+        bench.send(folder / "tee.stl")
+        page.until(lambda state: state["model"]["name"] == "tee.stl" and on_plate(state) == [])
+        assert json.loads(bench.ask("kept")[1])[0]["name"] == "box.stl, tee.stl"
+        bench.send(folder / "saved.3mf")
+        page.until(lambda state: on_plate(state) == [("tee.stl", 2)])
+        sliced(page)
+        assert bench.ask("print.gcode")[1] == gcode
+        page.do("undo")
+        page.do("undo")
+        page.until(lambda state: on_plate(state) == [("tee.stl", 2)] and state["model"]["name"] == "box.stl")
+
+
+def test_a_model_opened_over_another_one_can_be_put_beside_it_instead(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        bench.send(folder / "tee.stl")
+        page.do("add", normal=[0, 0, 1], offset_mm=20.0)
+        page.until(lambda state: state["parts"] == 2)
+        bench.send(folder / "box.stl")
+        page.until(lambda state: state["addable"] == "box.stl")
+        page.do("add_opened")
+        state = page.until(lambda state: on_plate(state) == [("box.stl", 1)])
+        assert (state["model"]["name"], state["parts"], state["addable"]) == ("tee.stl", 2, "")
+        page.do("add_opened")
+        assert page.until(lambda state: state["problem"])["problem"].startswith("no model has just been opened over another")
+        page.do("set", key="process.scale", value="2")
+        page.until(lambda state: state["scale"] == 2.0 and on_plate(state) == [("box.stl", 1)])
+        page.do("beside", number=1, count=900)
+        told = page.until(lambda state: state["copies_told"].startswith("box.stl measures 16.0 x 16.0 mm"))["copies_told"]
+        assert "no room for it" in told
+        page.do("undo")
+        page.until(lambda state: state["copies_told"] == "All 2 stand on the plate.")
+
+
+def test_what_is_a_plate_of_its_own_is_not_put_beside_a_model(bench: Running, folder: Path) -> None:
+    (folder / "print.gcode").write_text("G28\n")
+    with bench.line() as page:
+        bench.send(folder / "tee.stl")
+        assert add(bench, folder / "print.gcode")[0] == 422
+        assert page.until(lambda state: state["problem"])["problem"].startswith("print.gcode is a plate of its own")
+        assert add(bench, folder / "tee.stl")[0] == 422
+        assert page.until(lambda state: state["problem"].startswith("tee.stl is on the plate already"))
