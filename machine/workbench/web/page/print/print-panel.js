@@ -149,6 +149,7 @@ const STOP_KEY = "e", HOLD_MS = 600, TWICE_MS = 1000;
 function stopKey(stop) {
   let timer = 0, pressedAt = -Infinity;
   const release = () => {
+    clearTimeout(timer);
     delete $("emergency").dataset.held;
   };
   const finish = () => {
