@@ -141,8 +141,8 @@ def _usage(error: TyperException, given: Sequence[str]) -> str:
         return f"{files[0]} begins with a dash: write ./{files[0]}"
     command = context.command
     if message.startswith("Missing") and (missing := getattr(error, "param", None)) is not None:
-        name = f"{missing.opts[-1]} " if missing.opts[-1].startswith("-") else ""
-        return f"{name}{missing.metavar} is missing: {missing.help}; see {context.command_path} --help"
+        flag = f"{missing.opts[-1]} " if missing.opts[-1].startswith("-") else ""
+        return f"{flag}{missing.metavar} is missing: {missing.help}; see {context.command_path} --help"
     if (option := getattr(error, "option_name", None)) is not None:
         return _unknown("option", option, context.command_path, _option_names(command))
     commands = list(getattr(command, "commands", ()))
