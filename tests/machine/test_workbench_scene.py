@@ -145,7 +145,9 @@ def test_a_ring_turns_the_model_the_way_of_the_hand(browser: Browser, bench: Run
     opened(browser, bench, f"{axis}-{view}.stl", stl(box(20.0, 30.0, 40.0)))
     browser.click("#tab-model")
     browser.click(f"[data-view={view}]")
+    before = browser.value("document.documentElement.dataset.drawn")
     browser.click("#fit")
+    browser.wait(f"document.documentElement.dataset.drawn > {before}")  # the rings with the model in view
     pixels(browser)
     (least, most), reach = browser.value(f"[view.picture.box(), 1.05 * {STORE}.triangles.reach_mm]")
     angles = radians([10, 30, 50, 70])  # beside where rings meet
