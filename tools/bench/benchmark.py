@@ -3,13 +3,13 @@
 Each model is printed with support and dry-run in five ways, a row each: in one piece in its best orientation, the same piece by
 PrusaSlicer, in our parts, and in the parts of the search published in 2020, with its classic and with the learned ranking. The
 searches begin with the best orientation of one piece; ours may turn it. All get the same layers, line widths, walls, infill and
-speeds, one reader measures all G-code, and the area that needs support is counted by our terms for every row. `--log` appends
-each row at once and skips the models that the file has. The last line sums up the models that were cut. docs/benchmark.md has the
-table of named public models.
+speeds, one reader measures all G-code, and the area that needs support is counted by our terms. `--log` appends each row at once
+and skips the models that the file has. The last line sums up the models that were cut.
 """
 
 import argparse
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -33,23 +33,22 @@ from tools.checks.harness import files
 HEAD = ("model", "printed as", "parts", "needs support mm²", "seams mm", "min", "filament m", "message")
 ONE_PIECE, PRUSA, PARTS = "one piece, best orientation", "the same by PrusaSlicer", "our parts"
 PUBLISHED = (("published search, B = 10", "classic", 10), ("published search, learned, B = 2", "learned", 2))
+Used = tuple[float, float] | None  # minutes and metres of filament
 OWN = ("search.method=published", "search.objective=risky", "search.clearance=false", "search.count_platform_faces=true")
-Row = tuple[str, Decomposition | None, float | None, tuple[float, float] | None, str]
 
 
 def bench(given: argparse.Namespace) -> None:
     """Print the table, then the medians of the models that were cut."""
     settings = [*harness.SAME, harness.OUR_SUPPORT, *given.set]
-    profile = load(settings=settings)
     done = given.log.read_text(encoding="utf-8") if given.log and given.log.exists() else ""
     heading(*HEAD)
-    for file in files(given.models, given.every):
+    for file in files(given.models):
         if f"| {file.stem} |" in done:
             continue
         mesh = harness.standing(str(file), 0.0)
         if given.longest:
             mesh = Mesh(mesh.vertices * (given.longest / float((mesh.bounds_mm[1] - mesh.bounds_mm[0]).max())), mesh.faces)
-        for cells in rows(mesh, file.stem, profile, settings):
+        for cells in rows(mesh, file.stem, settings):
             text = f"| {' | '.join([file.stem, *cells])} |"
             print(text, flush=True)
             done += text + "\n"
@@ -64,14 +63,15 @@ def summary(lines: list[str]) -> str:
     cells = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
     whole = {row[0]: row for row in cells if row[1] == ONE_PIECE and row[5] != "-"}
     cut = [row for row in cells if row[1] == PARTS and row[2] != "1" and row[5] != "-" and row[0] in whole]
-    if not cut:
-        return "none was cut"
     time, filament = ([float(row[k]) / float(whole[row[0]][k]) for row in cut] for k in (5, 6))
-    return f"{len(cut)} cut: median time {median(time):.3f} (most {max(time):.3f}), filament {median(filament):.3f}"
+    return (
+        f"{len(cut)} cut: median time {median(time):.3f} (most {max(time):.3f}), filament {median(filament):.3f}" if cut else ""
+    )
 
 
-def rows(mesh: Mesh, name: str, profile: Profile, settings: list[str]) -> Iterator[list[str]]:
+def rows(mesh: Mesh, name: str, settings: list[str]) -> Iterator[list[str]]:
     """The cells of each way to print a model, behind its name."""
+    profile = load(settings=settings)
     mesh = set_on_plate(mesh, best_orientation(mesh, profile.process.self_supporting_angle_deg).rotation)
     needs_mm2 = float(mesh.areas_mm2[needing_upright(mesh, profile)].sum())
     whole = best_lying(decompose(mesh, name, profile, request=SearchRequest(parts=1)), profile)
@@ -92,24 +92,21 @@ def rows(mesh: Mesh, name: str, profile: Profile, settings: list[str]) -> Iterat
 def _in_parts(label: str, found: Decomposition, profile: Profile) -> list[str]:
     """The cells of a decomposition: printed, or why it cannot be."""
     needs_mm2 = sum(float(part.mesh.areas_mm2[residual_faces(part, profile)].sum()) for part in found.parts)
-    used, message = None, ""
+    cells = partial(_cells, label, len(found.parts), needs_mm2, found.seam_mm)
     try:
         program = build(found, profile)
-        used = minutes_and_metres(program.run.program, profile)
-        message = program.run.errors[0].message if program.run.errors else ""
     except UserError as error:
-        message = str(error)
-    return _cells(label, len(found.parts), needs_mm2, found.seam_mm, used, message)
+        return cells(None, str(error))
+    return cells(minutes_and_metres(program.run.program, profile), "".join(error.message for error in program.run.errors[:1]))
 
 
-def _cells(label: str, parts: int, needs_mm2: float, seam_mm: float, used: tuple[float, float] | None, message: str) -> list[str]:
+def _cells(label: str, parts: int, needs_mm2: float, seam_mm: float, used: Used, message: str) -> list[str]:
     minutes, metres = ("-", "-") if used is None else (f"{used[0]:.0f}", f"{used[1]:.2f}")
     return [label, str(parts), f"{needs_mm2:.0f}", f"{seam_mm:.0f}", minutes, metres, message]
 
 
 if __name__ == "__main__":
     parser = options_of(__doc__)
-    parser.add_argument("--every", type=int, default=1, help="every N-th file of a folder")
     parser.add_argument("--longest", type=float, default=0.0, metavar="MM", help="scale models to this extent; 0: as they are")
     parser.add_argument("--log", type=Path)
     run(parser, bench)

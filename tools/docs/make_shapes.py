@@ -1,7 +1,5 @@
-"""Make the shapes that planes cannot print according to hydra5x: `python tools/docs/make_shapes.py FOLDER` writes STL files.
-
-They are generated from its descriptions (maker-fab/hydra5x, docs/decisions.md). tools/RESULTS.md has their costs in parts and in
-one piece: `tiltprint export FOLDER/elbow.stl --as-is [--parts 1] -o elbow.gcode`.
+"""Make our own versions of the shapes that hydra5x (maker-fab/hydra5x, docs/decisions.md) calls unprintable by planar cuts:
+`python tools/docs/make_shapes.py FOLDER` writes STL files, `tiltprint export FOLDER/elbow.stl --as-is` prints one.
 """
 
 import sys
