@@ -3,8 +3,7 @@
 Each model is printed with support and dry-run in five ways, a row each: in one piece in its best orientation, the same piece by
 PrusaSlicer, in our parts, and in the parts of the search published in 2020, with its classic and with the learned ranking. The
 searches begin with the best orientation of one piece; ours may turn it. All get the same layers, line widths, walls, infill and
-speeds, one reader measures all G-code, and the area that needs support is counted by our terms. `--log` appends each row at once
-and skips the models that the file has. The last line sums up the models that were cut.
+speeds, and one reader measures all G-code. `--log` appends each row at once and skips the models that the file has.
 """
 
 import argparse

@@ -2,8 +2,7 @@
 
 Reading, one evaluation of all candidates of the search (`gains` and `sweep` of every direction), the search (without a change of
 orientation), slicing, planning, writing G-code, parsing it and the dry run each run in this process: core and wall seconds with
-loaded kernels. `--gcode FILE` measures parsing and the parts of the dry run for an existing program. A long program: `--set
-process.scale=2 --set process.layer_height_mm=0.1 --set process.infill_density=1 demo:figure`.
+loaded kernels. `--gcode FILE` measures parsing and the parts of the dry run for an existing program.
 """
 
 import argparse
