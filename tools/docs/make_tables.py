@@ -17,6 +17,7 @@ KEYS, STATES = DOCS / "keys.md", DOCS / "states.mmd"
 AXIS = re.compile(r"(?<=^machine)\.(x|y|z|tilt|turn)\.")
 UNIT = re.compile(r", (°C|N|s|deg|g/cm³|mm²|mm|MPa)(/s²|/s)?$|, mm³/s$")
 SHORT = {
+    r"^a (whole )?number from (\S+)$": r"≥ \2",
     "^a whole number from (.*)": r"\1, whole",
     "^a number (from )?": "",
     "above 0 and up to ": "≤ ",
