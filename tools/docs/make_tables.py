@@ -31,10 +31,7 @@ SHORT = {
 
 
 def table(section: str) -> str:
-    """A Markdown table of a section's keys: the beginning of what each means, what is allowed, the default.
-
-    Rows that differ only in the axis share a line.
-    """
+    """Markdown table of a section's keys: meaning, allowed values, default; keys that differ only in the axis share a row."""
     defaults = getattr(load(), section)
     rows: dict[tuple[str, ...], list[str]] = defaultdict(list)
     for key, field in keys(SECTIONS[section], f"{section}."):
