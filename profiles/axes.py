@@ -48,8 +48,8 @@ class RotaryAxis(Frozen):
     axis: Vector = advanced("Direction of the axis")(..., "direction in the machine frame (any length)")
     point_mm: Vector = advanced("Point on the axis", "centre of rotation calibration offset")(
         ...,
-        "point on the axis in the machine frame at tilt 0, turn 0; for the turn axis the point where it meets the table's "
-        "surface, which is the workpiece origin",
+        "point on the axis in the machine frame with both axes at zero_deg; for the turn axis the point where it meets the "
+        "table's surface, which is the workpiece origin",
     )
     sign: Literal[-1, 1] = advanced("Sense of turning", "direction invert")(
         ..., "-1: positive values turn the table right-handed about axis; 1: the other way"

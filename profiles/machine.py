@@ -56,8 +56,8 @@ class CradleBox(Frozen):
     """A body that tilts with the table but does not turn with it: a yoke's arm, a motor, the bearing's plate."""
 
     name: str = Field(description="what it is, for messages")
-    min_mm: Vector = Field(description="least x, y, z from the workpiece origin at tilt 0, mm; the plate's surface is z = 0")
-    max_mm: Vector = Field(description="greatest x, y, z from the workpiece origin at tilt 0, mm")
+    min_mm: Vector = Field(description="least x, y, z from the origin of a level table, mm; the plate's surface is z = 0")
+    max_mm: Vector = Field(description="greatest x, y, z from the origin of a level table, mm")
 
     def _problems(self) -> Iterable[str]:
         return _inverted(self.name, self.min_mm, self.max_mm)
@@ -266,7 +266,7 @@ class Machine(Frozen):
         dot = sum(a * b for a, b in zip(self.tilt.axis, self.turn.axis, strict=True))
         norm = hypot(*self.tilt.axis) * hypot(*self.turn.axis)
         if self.turn.axis[2] ** 2 < UPRIGHT**2 * sum(a * a for a in self.turn.axis):
-            yield f"turn.axis is {list(self.turn.axis)}: it must be vertical at tilt 0"
+            yield f"turn.axis is {list(self.turn.axis)}: it must be vertical when the table is level"
         elif abs(dot) > 0.999 * norm:
             yield "tilt.axis and turn.axis are parallel: the table could not be tilted to any side"
         elif (lean := self._greatest_lean_deg(dot / norm)) < LEAST_LEAN_DEG:

@@ -107,7 +107,7 @@ def test_a_share_is_also_read_as_a_percentage() -> None:
         ("machine.tilt.limits_deg=[9,20]", "machine.tilt.zero_deg is 0: it must lie inside limits_deg [9.0, 20.0]"),
         ("machine.tilt.axis=[0,0,0]", "machine.tilt.axis is [0.0, 0.0, 0.0]: a direction must not be zero"),
         ("machine.tilt.axis=[0,0,1]", "machine.tilt.axis and turn.axis are parallel: the table could not be tilted to any side"),
-        ("machine.turn.axis=[1,0,1]", "machine.turn.axis is [1.0, 0.0, 1.0]: it must be vertical at tilt 0"),
+        ("machine.turn.axis=[1,0,1]", "machine.turn.axis is [1.0, 0.0, 1.0]: it must be vertical when the table is level"),
         ("machine.tilt.letter=C", "machine.tilt.letter and turn.letter are both C: they must differ"),
         (
             "machine.head.silhouette_mm=[[2,0],[1,3]]",
