@@ -56,8 +56,8 @@ class CradleBox(Frozen):
     """A body that tilts with the table but does not turn with it: a yoke's arm, a motor, the bearing's plate."""
 
     name: str = Field(description="what it is, for messages")
-    min_mm: Vector = Field(description="least x, y, z from the origin of a level table, mm; the plate's surface is z = 0")
-    max_mm: Vector = Field(description="greatest x, y, z from the origin of a level table, mm")
+    min_mm: Vector = Field(description="least x, y, z from the workpiece origin when level, mm; the plate's surface is z = 0")
+    max_mm: Vector = Field(description="greatest x, y, z from the workpiece origin when level, mm")
 
     def _problems(self) -> Iterable[str]:
         return _inverted(self.name, self.min_mm, self.max_mm)
