@@ -62,8 +62,23 @@ def test_the_recipe_of_the_page_finds_the_tilt_axis(y_mm: float, z_mm: float, an
     assert axis == pytest.approx((y_mm, z_mm), abs=1e-6)
 
 
+@given(st.floats(-30, 30), st.floats(-60, 60), st.floats(20, 90))
+def test_the_recipe_of_the_page_finds_a_tilt_axis_along_y(x_mm: float, z_mm: float, angle_deg: float) -> None:
+    machine = load(settings=["machine.tilt.axis=[0,1,0]", f"machine.tilt.point_mm=[{x_mm!r},0,{z_mm!r}]"]).machine
+    x, _, z = machine_points(machine, Pose(angle_deg, 0.0), np.zeros((1, 3)))[0]
+    c, s = cos(radians(angle_deg)), sin(radians(angle_deg))
+    axis = ((1 - c) * x + s * z) / (2 * (1 - c)), ((1 - c) * z - s * x) / (2 * (1 - c))
+    assert axis == pytest.approx((x_mm, z_mm), abs=1e-6)
+
+
 def test_positive_values_turn_the_table_as_the_page_says() -> None:
     machine = load(settings=["machine.tilt.point_mm=[0,0,0]"]).machine
     rear, right = np.array([[0.0, 10.0, 0.0]]), np.array([[10.0, 0.0, 0.0]])
     assert machine_points(machine, Pose(10.0, 0.0), rear)[0, 2] > 0
     assert machine_points(machine, Pose(0.0, 10.0), right)[0, 1] > 0
+
+
+def test_positive_values_raise_the_left_edge_of_a_table_that_tilts_about_y() -> None:
+    machine = load(settings=["machine.tilt.axis=[0,1,0]", "machine.tilt.point_mm=[0,0,0]"]).machine
+    left = np.array([[-10.0, 0.0, 0.0]])
+    assert machine_points(machine, Pose(10.0, 0.0), left)[0, 2] > 0

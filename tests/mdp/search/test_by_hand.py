@@ -144,7 +144,7 @@ def test_a_plan_of_another_model_is_refused() -> None:
 def test_a_plane_beside_the_model_is_refused_with_what_it_could_be() -> None:
     sentence = _refusal(shapes.box(), (UP, 35.0))
     assert sentence.startswith("plan mine.toml: part 2 cannot be cut off: its plane misses the model")
-    assert "between 0.00 and 20.00 mm, offset_mm is 35" in sentence
+    assert "between 0.0 and 20.0 mm, offset_mm is 35" in sentence
 
 
 def test_planes_in_an_impossible_order_are_refused() -> None:
