@@ -81,7 +81,8 @@ def test_a_model_without_a_feasible_cut_is_one_part_and_says_how_many_candidates
     decomposition = _decomposed(shapes.tee(height=12.0, arm=14.0), "least_volume_share=0.5")
     assert len(decomposition.parts) == 1
     reasons = [line.partition(" candidates: ") for line in decomposition.rejected]
-    assert reasons and all(int(count) > 0 and text for count, _, text in reasons)
+    assert reasons
+    assert all(int(count) > 0 and text for count, _, text in reasons)
 
 
 def test_a_time_limit_that_ends_a_search_leaves_whole_parts() -> None:
