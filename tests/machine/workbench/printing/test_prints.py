@@ -174,7 +174,7 @@ def test_whoever_dies_a_print_server_goes_on_and_its_key_is_told_nowhere(
     monkeypatch.setenv(VARIABLE, KEY)
     with stand_in("octoprint") as (job, address):
         job.steps = 10_000
-        ended = print_until(address, lambda current: current.state.state == "printing", end)
+        ended = print_until(address, lambda current: current.state.live and current.state.state == "printing", end)
         assert job.state == "printing"
     assert ended.sentence == expected.format(address=address)
     assert job.files["hour.gcode"].decode() == HOUR
