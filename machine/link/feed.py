@@ -236,10 +236,14 @@ class Feed:
         self.set_state(PrintState.FINISHING)
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send("M155 S0")
-        # first what is still to be sent: an override that was not sent must not be undone
-        for own in (*self.pending.next_lines(self.modal), *self.pending.undo_overrides()):
+        for own in self.pending.next_lines(self.modal):
             exchange.send(own)
-        self._end_moves()
+        self._end_moves()  # firmwares shift the tip at once: the last moves must be over before its offset is undone
+        if undone := self.pending.undo_overrides():
+            self.pending.sent_offset_mm = 0.0  # a cancel must not undo it again
+            for own in undone:
+                exchange.send(own)
+            self._end_moves()
         self.finished = True
         self._record()
         self.show(exchange.medium.now_s())

@@ -87,7 +87,8 @@ class PendingCommands:
     feed_percent: float = 100.0
     flow_percent: float = 100.0
     babystep: str = ""  # the firmware's command for {} mm; "": it has none
-    z_offset_mm: float = 0.0
+    z_offset_mm: float = 0.0  # as requested
+    sent_offset_mm: float = 0.0  # as far as it was sent
     message: str = ""  # why the newest request was refused
 
     def poll(self, state: PrintState, now_s: float) -> None:
@@ -121,6 +122,8 @@ class PendingCommands:
             self.pause_s = None
         elif command is Command.LINE:
             self._queue_line(request.text, state)
+        elif state is PrintState.FINISHING:
+            self.message = "the print is finishing: nothing can be changed"
         elif command is Command.BABYSTEP:
             self._shift(request.value)
         else:
@@ -130,6 +133,9 @@ class PendingCommands:
         """The user's commands to send now; settings that they change hold for the rest of the print."""
         while self.lines:
             command = self.lines.popleft()
+            before, _, after = self.babystep.partition("{}")
+            if self.babystep and command.startswith(before) and command.endswith(after):
+                self.sent_offset_mm += float(command.removeprefix(before).removesuffix(after))
             yield command
             if not command_in(command).moves:
                 modal.take(command)
@@ -148,18 +154,20 @@ class PendingCommands:
             self.flow_percent = value
 
     def undo_overrides(self) -> list[str]:
-        """Commands that reset the overrides, which the firmware would keep for the next print."""
+        """Commands that reset the sent overrides, which the firmware would keep for the next print."""
         pairs = (("M220", self.feed_percent), ("M221", self.flow_percent))
         undone = [f"{name} S100" for name, value in pairs if value != 100.0]
-        return [*undone, offset_undone(self.z_offset_mm, self.babystep)] if self.z_offset_mm else undone
+        offset_mm = round(self.sent_offset_mm, 3)
+        return [*undone, offset_undone(offset_mm, self.babystep)] if offset_mm else undone
 
     @property
     def kept_offset(self) -> str:
         """A sentence on a Z offset that the firmware keeps for the next print if this one stops now; "" for none."""
-        if not self.z_offset_mm or not self.babystep.endswith(KEEPS_OFFSET):
+        offset_mm = round(self.sent_offset_mm, 3)
+        if not offset_mm or not self.babystep.endswith(KEEPS_OFFSET):
             return ""
-        undone = offset_undone(self.z_offset_mm, self.babystep)
-        return f"the printer keeps the Z offset of {self.z_offset_mm:+g} mm: before another print send it {undone}"
+        undone = offset_undone(offset_mm, self.babystep)
+        return f"the printer keeps the Z offset of {offset_mm:+g} mm: before another print send it {undone}"
 
     def _queue_line(self, text: str, state: PrintState) -> None:
         why = line_refusal(text, self.axes, state is PrintState.PAUSED, self.limit)

@@ -73,10 +73,17 @@ def test_steps_below_a_micrometre_do_not_pass_the_limit_unseen() -> None:
     assert round(sent_mm, 3) == pending.z_offset_mm <= 2.0
 
 
-def test_a_z_offset_asked_for_after_the_last_command_is_not_taken_back_unsent() -> None:
+def test_a_z_offset_requested_while_a_print_finishes_is_neither_sent_nor_taken_back() -> None:
     watcher = watched({len(PROGRAM) - 4: (Command.BABYSTEP, -0.05)})  # as the last commands fill the window
     watcher.run(PROGRAM)
-    assert [line for line in watcher.lines() if line.startswith("M290")] == ["M290 Z-0.050", "M290 Z0.050"]
+    assert [line for line in watcher.lines() if line.startswith("M290")] == []
+
+
+def test_a_z_offset_that_was_taken_back_or_never_sent_is_not_reported_as_kept() -> None:
+    pending = PendingCommands(axes_of(load(machine="fractal5pro").machine), babystep="SET_GCODE_OFFSET Z_ADJUST={} MOVE=1")
+    pending.accept(PendingCommand(Command.BABYSTEP, -0.05), PrintState.PRINTING, 0.0)
+    assert pending.kept_offset == ""
+    assert pending.undo_overrides() == []
 
 
 @pytest.mark.parametrize(("machine", "sentence"), [

@@ -54,7 +54,7 @@ export function platePanel() {
   } });
   onState(({ addable }) => sayIn("add-opened", addable && `Add ${addable} to the plate instead`));
   onNew(({ model, copies, beside, problem }) => [model ? [{ name: model.name, copies }, ...beside] : [], problem], ([models, problem]) => putRows(
-    models.map(({ name, copies }, number) => ({ id: name, told: `${number} ${copies} ${problem}`, make: () => plateRow(name, copies, number) })), $("plate-list")));
+    models.map(({ name, copies }, number) => ({ id: `${number} ${name}`, told: `${copies} ${problem}`, make: () => plateRow(name, copies, number) })), $("plate-list")));
 }
 
 function plateRow(name, copies, number) {

@@ -261,7 +261,7 @@ function tellAll(moved) {
   if (plane) {
     const [tilt, towards] = anglesOf(plane.normal);
     Object.entries({ offset: plane.offset_mm.toFixed(2), tilt: tilt.toFixed(1), towards: towards.toFixed(1) }).forEach(([name, value]) => fill($(`plane-${name}`), value));
-    document.querySelectorAll(":is(#plane, #plane-tools) :is(input, button)").forEach((control) => { control.disabled = line !== "open" || (isLocked() && control.id !== "lock"); });
+    document.querySelectorAll(":is(#plane, #plane-tools) :is(input, button)").forEach((control) => { control.disabled = line !== "open" || (isLocked() && !["lock", "put-near", "put-aside"].includes(control.id)); });
     $("lock").className = isLocked() ? "icon-locked" : "icon-unlocked";
     pressed("lock", isLocked());
     hide({ limb: Boolean(plane.limbs_mm), "all-above": !plane.limbs_mm });

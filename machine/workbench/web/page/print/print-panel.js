@@ -38,7 +38,7 @@ export function printFrame(camera, picture) {
   const show = () => {
     const { state: { sliced, gcode }, looking, tab } = store, shown = looking === "gcode" ? gcode : sliced, address = shown ? `print/${shown.key}` : "", there = frame.getAttribute("src") === address;
     toggle("looking", looking && tab !== "printing");
-    pressed("look", looking);
+    pressed("look", looking === true);
     hide({ "print-page": !looking, "leave-print": !looking });
     if (looking && there && ready) postView();
     if (!looking || there) return;
@@ -46,7 +46,7 @@ export function printFrame(camera, picture) {
     frame.src = address;
   };
   subscribe((now, before) => {
-    if (now.looking !== before.looking) show();
+    if (now.looking !== before.looking || (now.looking === "gcode" && now.state.gcode?.key !== before.state?.gcode?.key)) show();
     if (now.dark !== before.dark && ready) post("theme", { dark: now.dark });
   });
   return (place) => {

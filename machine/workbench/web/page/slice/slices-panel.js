@@ -9,7 +9,7 @@ import { onNew, onState, store, subscribe, update } from "../store.js";
 
 export function slicesPanel(showFinding) {
   listen("click", {
-    again: () => $("slice").click(), look: () => update({ looking: !store.looking }), "leave-print": () => { update({ looking: false }); $("look").focus(); },
+    again: () => $("slice").click(), look: () => update({ looking: store.looking !== true }), "leave-print": () => { update({ looking: false }); $("look").focus(); },
   });
   onState(({ slicing, sliced, colours }) => {
     disable({ slice: Boolean(slicing) });
@@ -21,7 +21,7 @@ export function slicesPanel(showFinding) {
   });
   onNew(({ sliced }) => sliced, (sliced) => {
     const { told = [], joints = [], verdict } = sliced || {};
-    if (!sliced) update({ looking: false });
+    if (!sliced && store.looking === true) update({ looking: false });
     else showVerdict(verdict, showFinding);
     tellIn("sliced-told", told);
     putTable($("joints"), joints, JOINT_HEAD, () => joints.map(figuresRow));
