@@ -136,7 +136,10 @@ def _project(request: ModelRequest, decomposed: Decomposed) -> Project:
         parts=len(decomposition.parts),
         stops=request.stops,
         copies=copies,
-        beside=tuple((name if files[name] is None else Path(name).name, files[name], count) for name, count in beside.items()),
+        beside=tuple(
+            (name if files[name] is None else Path(name).name, files[name], count * request.copies)
+            for name, count in beside.items()
+        ),
         figures=figures_of(decomposition.chosen),
         plate=request.plate,
         marks_in_plan=not request.own_marks,

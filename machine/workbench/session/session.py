@@ -356,7 +356,7 @@ class Session(SessionBase):
         if bench.cuts is None or effect < Effect.REACH:
             return bench, ""
         bench, removed = await self.trials.without_invalid(bench)
-        return bench if bench.cuts else replace(bench, cuts=None), removed_in_words(removed)
+        return replace(bench, cuts=None) if removed and not bench.cuts else bench, removed_in_words(removed)
 
     async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None, asks: bool = False) -> Model:
         """The model of a file, whose mesh file exists as long as the model. asks: ask the page for the unit if the size suggests
