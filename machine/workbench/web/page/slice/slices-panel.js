@@ -9,7 +9,11 @@ import { onNew, onState, store, subscribe, update } from "../store.js";
 
 export function slicesPanel(showFinding) {
   listen("click", {
-    again: () => $("slice").click(), look: () => update({ looking: store.looking !== true }), "leave-print": () => { update({ looking: false }); $("look").focus(); },
+    again: () => $("slice").click(), look: () => update({ looking: store.looking !== true }),
+    "leave-print": () => {
+      update({ looking: false });
+      for (const id of [`tab-${store.tab}`, "look"]) $(id).focus(); // what is hidden takes no focus
+    },
   });
   onState(({ slicing, sliced, colours }) => {
     disable({ slice: Boolean(slicing) });
@@ -21,8 +25,8 @@ export function slicesPanel(showFinding) {
   });
   onNew(({ sliced }) => sliced, (sliced) => {
     const { told = [], joints = [], verdict } = sliced || {};
-    if (!sliced && store.looking === true) update({ looking: false });
-    else showVerdict(verdict, showFinding);
+    if (sliced) showVerdict(verdict, showFinding);
+    else if (store.looking === true) update({ looking: false });
     tellIn("sliced-told", told);
     putTable($("joints"), joints, JOINT_HEAD, () => joints.map(figuresRow));
     showFindings(sliced, showFinding);
