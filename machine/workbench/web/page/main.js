@@ -1,8 +1,8 @@
 // Main: the line to the server, the picture and the panels put together.
 
-import { $, button, disable, duration, hide, listen, made, notice, onData, onKeys, putNew, tabsOf, tell, themeSwitch, toggle, withWholeOptions } from "../../../view/template/elements.js";
+import { $, button, duration, hide, listen, made, notice, onData, onKeys, putNew, tabsOf, tell, themeSwitch, toggle, withWholeOptions } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
-import { LINE_TOLD, openLine, send } from "./line.js";
+import { ask, LINE_TOLD, openLine, send } from "./line.js";
 import { benchesPanel, devicesPanel, platePanel } from "./model/benches.js";
 import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
 import { bodiesOf, facetsOf, modelFetcher, modelOf, thumbnailsOf } from "./model/model.js";
@@ -37,7 +37,7 @@ function main() {
   tabsOf((tab) => update({ tab }));
   const restoreLook = keptLook(camera, picture);
   onState(tellState);
-  subscribe(onlyWithLine);
+  subscribe((now, before) => { if (now.line !== before.line) onlyWithLine(now.line === "open"); });
   onState(({ note }) => notice(note, "note"));
   slicesPanel(printFrame(camera, picture));
   const panels = [problemLine, elapsedTimes, historyMenu, previewOf, benchesPanel, devicesPanel, platePanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
@@ -71,17 +71,13 @@ function tellState({ model, busy, undo, redo, search, slicing, preparing, machin
   root.dataset.busy = busy;
   root.toggleAttribute("data-searching", Boolean(search));
   toggle("no-model", !model);
-  for (const [id, word] of Object.entries({ undo, redo })) $(id).ariaLabel = word ? `${id}: ${word}` : id;
+  for (const [id, word] of Object.entries({ undo, redo })) Object.assign($(id), { ariaLabel: word ? `${id}: ${word}` : id, disabled: !word });
   const place = $(model ? "earlier-work" : "drop"); // where nothing is open, it is offered at once
   if (!place.contains($("kept-field"))) place.append($("kept-field"));
 }
 
-/** What asks the bench for something cannot be pressed while there is no line to it; prints have a line of their own. */
-function onlyWithLine({ state, line }) {
-  const none = line !== "open";
-  document.querySelectorAll("#panel > section:not(#printing) fieldset").forEach((fields) => { fields.disabled = none; });
-  disable({ undo: none || !state.undo, redo: none || !state.redo, save: none, again: none });
-}
+/** A fieldset disables all controls in it, also those that are added later. Every control of the bench is in one; prints have a connection of their own. */
+const onlyWithLine = (open) => document.querySelectorAll("fieldset:is(.linked, :not(#printing *))").forEach((fields) => { fields.disabled = !open; });
 
 /** What could not be done last, for as long as it is so or until it is read. */
 function problemLine() {
@@ -103,7 +99,11 @@ function historyMenu() {
 /** A print that this page has had sliced is looked at as soon as it is ready, unless something else is looked at by then. */
 function previewOf() {
   let wanted = false;
-  listen("click", { slice: () => { wanted = true; update({ looking: false }); $("tab-slices").click(); } });
+  listen("click", { slice: () => {
+    update({ looking: false });
+    $("tab-slices").click();
+    ask({ do: "slice" }, (refusal) => { wanted = !refusal; });
+  } });
   onState(({ slicing, sliced }, before) => {
     const ended = before?.slicing && !slicing;
     if (ended && wanted && store.tab === "slices" && sliced?.verdict.kind === "ready") update({ looking: true });

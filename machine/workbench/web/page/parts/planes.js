@@ -255,13 +255,13 @@ function movedInWords({ normal, offset_mm: wanted }, there) {
 }
 
 function tellAll(moved) {
-  const { state: { locked, search, cuts }, part, tab, line } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store);
+  const { state: { locked, search, cuts }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store);
   disable({ "find-others": Boolean(search) || !locked.some(Boolean) });
   hide({ plane: !plane, "plane-tools": !plane || tab !== "parts" || Boolean(search) });
   if (plane) {
     const [tilt, towards] = anglesOf(plane.normal);
     Object.entries({ offset: plane.offset_mm.toFixed(2), tilt: tilt.toFixed(1), towards: towards.toFixed(1) }).forEach(([name, value]) => fill($(`plane-${name}`), value));
-    document.querySelectorAll(":is(#plane, #plane-tools) :is(input, button)").forEach((control) => { control.disabled = line !== "open" || (isLocked() && !["lock", "put-near", "put-aside"].includes(control.id)); });
+    document.querySelectorAll(":is(#plane, #plane-tools) :is(input, button)").forEach((control) => { control.disabled = isLocked() && !["lock", "put-near", "put-aside"].includes(control.id); });
     $("lock").className = isLocked() ? "icon-locked" : "icon-unlocked";
     pressed("lock", isLocked());
     hide({ limb: Boolean(plane.limbs_mm), "all-above": !plane.limbs_mm });
