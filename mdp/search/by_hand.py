@@ -300,7 +300,7 @@ def _missed_reason(problem: Problem, node: Node, plane: Plane) -> str | None:
         return f"nothing is left {side} its plane, the parts printed after it took it: the order is impossible"
     return (
         f"its plane misses the model: along its normal the model lies between {whole.min():.1f} and {whole.max():.1f} mm, "
-        f"{phrase('offset', f'offset_mm is {plane.offset_mm:.6g}', f'{plane.offset_mm:.6g}')}"
+        f"{phrase('offset', f'offset_mm is {plane.offset_mm:.6g}', f'{plane.offset_mm:.1f}')}"
     )
 
 

@@ -9,6 +9,7 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from machine.workbench.bench.page_words import page_words
 from mdp.cut import below, mesh_of, solid_of
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh
@@ -145,6 +146,12 @@ def test_a_plane_beside_the_model_is_refused_with_what_it_could_be() -> None:
     sentence = _refusal(shapes.box(), (UP, 35.0))
     assert sentence.startswith("plan mine.toml: part 2 cannot be cut off: its plane misses the model")
     assert "between 0.0 and 20.0 mm, offset_mm is 35" in sentence
+
+
+def test_a_page_shows_the_offset_of_a_refused_plane_with_one_decimal() -> None:
+    with pytest.raises(PlanError) as refused:
+        _cut(shapes.box(), (UP, 34.56789))
+    assert page_words(f"{refused.value}").endswith("between 0.0 and 20.0 mm, the offset is 34.6 mm")
 
 
 def test_planes_in_an_impossible_order_are_refused() -> None:

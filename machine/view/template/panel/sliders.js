@@ -1,6 +1,6 @@
 // Sliders: the one over the whole print, with playing and keys, and the two that limit the layers, with a bar for the time of every layer.
 
-import { $, duration, hide, listen, numberIn, onKeys, optionsOf, tell } from "../elements.js";
+import { $, duration, hide, listen, nextFrame, numberIn, onKeys, optionsOf, tell } from "../elements.js";
 import { viewKeys } from "../picture/camera.js";
 import { density } from "../picture/gl.js";
 import { clamp } from "../picture/math.js";
@@ -31,22 +31,24 @@ export function courseOf(print, scene, bells) {
 function playerOf(scene, bells, total) {
   const player = { playing: false };
   let before = 0;
-  const step = (now) => {
+  const step = () => {
     if (!player.playing) return;
-    const next = scene.time() + (Math.min(now - before, 250) / 1000) * numberIn("speed");
+    const now = performance.now(), next = scene.time() + (Math.min(now - before, 250) / 1000) * numberIn("speed");
     before = now;
     scene.goToTime(Math.min(next, total));
     bells.ring("moving");
-    if (next >= total) player.stop(); else requestAnimationFrame(step);
+    if (next >= total) player.stop(); else ask();
   };
+  const ask = nextFrame(step);
   player.toggle = () => {
     player.playing = !player.playing;
     $("play").textContent = player.playing ? "❚❚" : "▶";
     $("play").setAttribute("aria-label", player.playing ? "Pause" : "Play");
     bells.ring("look");
-    if (player.playing && scene.time() >= total) scene.goToTime(0);
+    if (!player.playing) return;
+    if (scene.time() >= total) scene.goToTime(0);
     before = performance.now();
-    requestAnimationFrame(step);
+    ask();
   };
   player.stop = () => { if (player.playing) player.toggle(); };
   player.go = (row) => {

@@ -30,20 +30,32 @@ export async function takeFiles(files) {
   for (const file of [first, ...files.filter(isPlan)].flat()) await sendFile(file);
 }
 
-/** Sends a file to a bench and shows how much of it is sent, with a button that breaks it off; what is wrong with it comes back by the line; how: more of its address. */
-const sendFile = (file, how = {}, to = "") => new Promise((done) => {
+let uploaded = Promise.resolve(); // when the last file has been sent: one after the other, so that bar and Cancel belong to one file
+
+/** Send a file to a bench, with progress and a Cancel button. Resolves when the server has answered; errors arrive by the connection. how: more of its address. */
+const sendFile = (file, how = {}, to = "") => new Promise((answered) => {
+  uploaded = uploaded.then(() => new Promise((sent) => upload(file, how, to, sent, answered)));
+});
+
+function upload(file, how, to, sent, answered) {
   const request = new XMLHttpRequest(), mb = (bytes) => (bytes / 1e6).toFixed(1);
   request.upload.onprogress = ({ loaded, total }) => {
     hide({ sending: false });
     Object.assign($("sending-bar"), { value: loaded, max: total });
     tell({ "sending-told": `Sending ${file.name}: ${mb(loaded)} of ${mb(total)} MB` });
   };
-  request.upload.onloadend = () => hide({ sending: true }); // it is read now, of which the state tells
-  request.onloadend = done;
+  request.upload.onloadend = () => { // the server reads it now, which its state tells
+    hide({ sending: true });
+    sent();
+  };
+  request.onloadend = () => {
+    sent();
+    answered();
+  };
   $("sending-cancel").onclick = () => request.abort();
   request.open("POST", `${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE, ...how })}`);
   request.send(file);
-});
+}
 
 /** The models on the plate, each with its number of copies, and what puts further ones there. */
 export function platePanel() {

@@ -178,7 +178,7 @@ function markRow(zone, chosen) {
   const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
   const remove = removeButton(`Remove ${name}`, () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
   const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
-    : zone.point_mm ? `faces up to ${zone.angle_deg}°` : zone.faces ? `${zone.faces.toLocaleString("en")} faces` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
+    : zone.point_mm ? `faces up to ${Number(zone.angle_deg.toFixed(1))}°` : zone.faces ? `${zone.faces.toLocaleString("en")} faces` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
   const mark = made("input", { type: "radio", name: "mark", value: `${zone.kind} ${zone.number}`, checked: chosen, ariaLabel: name, onchange: () => chooseMark(zone) });
   return rowOf([made("label", {}, mark, swatch(`rgb(${colour})`), word), where, remove]);
 }
