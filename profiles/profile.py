@@ -1,13 +1,14 @@
 """Profile: a machine, a material and a process, loaded by name or from a file with --set overrides, or checked."""
 
 from collections.abc import Iterable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from pydantic import Field, ValidationError
 
 from profiles.errors import ProfileError
-from profiles.frozen import Frozen
+from profiles.frozen import TITLES, Frozen
 from profiles.machine import Machine
 from profiles.material import Material
 from profiles.messages import option
@@ -31,7 +32,7 @@ from profiles.problems import lifted_twice, table_problems, too_hot, unfit_for_n
 from profiles.process import Process
 from profiles.search import Search
 from profiles.toml_text import read_value
-from profiles.wording import sentences
+from profiles.wording import keys, sentences
 
 __all__ = ["DEFAULTS", "KINDS", "OF_KIND", "SECTIONS", "Profile", "kind_of", "known", "load", "load_one", "rows", "shipped"]
 
@@ -171,6 +172,18 @@ def rows(prefix: str, model: Frozen) -> Iterator[tuple[str, Any, str]]:
             yield from rows(f"{prefix}.{key}", value)
         else:
             yield f"{prefix}.{key}", model.model_dump(mode="json")[key], field.description or ""
+
+
+@cache
+def labels() -> dict[str, str]:
+    """The label of every key."""
+    return {key: field.title or "" for section, model in SECTIONS.items() for key, field in keys(model, f"{section}.")}
+
+
+def label_of(key: str) -> str:
+    """The label of a key, with the title of its table where it is nested; an unknown key itself."""
+    label, table = labels().get(key), key.rpartition(".")[0]
+    return key if label is None else f"{TITLES[table]}: {label}" if table.count(".") else label
 
 
 def _apply(whole: dict[str, Any], setting: str) -> None:

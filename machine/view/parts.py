@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from machine.quantities import about
 from mdp.decomposition import ORDER_TOLERANCE_MM, Decomposition, FrontRow, Part
 from mdp.mesh import Floats
 from mdp.overhang import risky_above, risky_upright
@@ -54,7 +55,18 @@ def risky_before_mm2(part: Part, angle_deg: float, count_platform_faces: bool) -
 def front_record(row: FrontRow) -> dict[str, Any]:
     """A row of a front for pages. planes: in print order, beginning with part 2; why: reason of the chosen row, else ""."""
     planes = [plane_values(plane) for plane in reversed(row.planes)]
-    return front_values(row) | {"why": row.reason, "planes": planes}
+    return front_values(row) | {"why": row.reason, "planes": planes, "figures": front_figures(row)}
+
+
+def front_figures(row: FrontRow) -> list[tuple[str, str, str]]:
+    """Names, values and units of the costs of a row of a front; "" for an unknown value."""
+    return [
+        ("area to support", f"{max(row.support_area_mm2, 0.0):.1f}", "mm²"),
+        ("seams", f"{row.seam_mm:.0f}", "mm"),
+        ("stair-stepping", f"{max(row.stairs_mm2, 0.0):.1f}", "mm²"),
+        ("takes about", "" if row.time_s is None else about(row.time_s), ""),
+        ("plastic", "" if row.filament_mm is None else f"{row.filament_mm / 1000.0:.1f}", "m"),
+    ]
 
 
 def front_records(decomposition: Decomposition) -> list[dict[str, Any]]:

@@ -24,7 +24,7 @@ from profiles.errors import ProfileError
 from profiles.frozen import Frozen
 from profiles.messages import terminal_words
 from profiles.places import OF_KIND, shipped
-from profiles.profile import DEFAULTS, SECTIONS, Profile, load_one, rows
+from profiles.profile import DEFAULTS, SECTIONS, Profile, label_of, load_one, rows
 
 Table = dict[str, Any]
 Row = list[str]
@@ -274,16 +274,17 @@ def settings_tables(profile: Profile) -> list[Table]:
     for section in SECTIONS:
         before = {key: value for key, value, _ in rows(section, usual[section])}
         for key, value, meaning in rows(section, getattr(profile, section)):
-            every.append([key, _text(value), meaning])
+            every.append([label_of(key), _text(value), meaning, key])
             if key not in before or before[key] != value:
-                changed.append([key, _text(value), _text(before[key]) if key in before else ""])
+                changed.append([label_of(key), _text(value), _text(before[key]) if key in before else ""])
     for part in profile.parts:
         shared = profile.process.model_dump(mode="json")
-        changed += [[f"part {part.part}: process.{key}", _text(value), _text(shared[key])] for key, value in part.process.items()]
+        name = f"part {part.part}: "
+        changed += [[name + label_of(f"process.{key}"), _text(value), _text(shared[key])] for key, value in part.process.items()]
     notes = [] if changed else ["all settings have their default values"]
     return [
         _table("Settings changed", ["setting", "value", "default"], changed, notes),
-        _table("All settings", ["setting", "value", "meaning"], every, folded=True),
+        _table("All settings", ["setting", "value", "meaning", "key"], every, folded=True),
     ]
 
 

@@ -268,7 +268,7 @@ def test_a_plan_s_modifiers_are_listed_and_drawn(browser: Browser, bench: Runnin
         bench.send(Path("modified.toml"))
         page.until(lambda state: state["modifiers"])
         browser.wait("document.querySelectorAll('#marks tr').length === 1")
-        assert browser.value("$('marks').textContent") == "modifierinfill_density = 1.0"
+        assert browser.value("$('marks').textContent") == "modifierInfill density = 1.0"
         browser.wait("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
         assert (pixels(browser) != bare).any(axis=2).mean() > 0.005
 

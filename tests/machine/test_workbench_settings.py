@@ -188,8 +188,10 @@ def test_a_front_stays_with_what_no_search_reads_its_times_are_worked_out_anew_a
     assert after[:4] == before[:4]
     assert float(after[5].split()[0]) > float(before[5].split()[0])  # metres of filament
     put(browser, "process.self_supporting_angle_deg", 40)
-    browser.wait(f"{changed('process.self_supporting_angle_deg')} && $('front-field').hidden && {IDLE}")
+    browser.wait(f"{changed('process.self_supporting_angle_deg')} && $('front').disabled && {IDLE}")
+    assert browser.value("$('front-stale').textContent").startswith("To choose another number, find parts again")
+    assert browser.value("!$('front-field').hidden && !$('front-stale').hidden")
     browser.click("#undo")
-    browser.wait("!$('front-field').hidden")
+    browser.wait("!$('front').disabled && $('front-stale').hidden")
     assert browser.value(row) == after
     assert browser.complaints == []

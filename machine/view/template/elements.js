@@ -172,7 +172,6 @@ export function onKeys(keys, closed) {
 }
 
 export const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
-export const newtons = (force) => `${Number(force.toPrecision(2))} N`;
 export const clock = (seconds, form = {}) => new Date(1000 * seconds).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", ...form });
 
 /** A time of today, or a date and a time. */

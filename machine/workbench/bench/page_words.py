@@ -5,12 +5,9 @@ A key is shown by its label, an option by the field that does the same.
 
 from typing import Any
 
-from profiles.frozen import TITLES
 from profiles.messages import rendered
-from profiles.profile import SECTIONS
-from profiles.wording import keys
+from profiles.profile import label_of, labels
 
-LABELS = {key: field.title or "" for section, model in SECTIONS.items() for key, field in keys(model, f"{section}.")}
 # By the name of a mark. An option has two texts, without and with its value; a phrase has one.
 OPTIONS = {
     "--as-is": ("Undo", ""),
@@ -78,16 +75,8 @@ def _words(name: str, value: str, terminal: str) -> str:
     """The page's text for a mark, or the terminal's if the page has no such field."""
     if name.endswith("--set") and "=" in value:
         key, _, given = value.partition("=")
-        return f"set {_label(key)} to {given}" if name.startswith("advice") else f"{_label(key)} = {given}"
+        return f"set {label_of(key)} to {given}" if name.startswith("advice") else f"{label_of(key)} = {given}"
     if name in OPTIONS:
         bare, with_value = OPTIONS[name]
         return with_value.format(value) if value and with_value else bare
-    return PHRASES[name].format(value) if name in PHRASES else _label(name) if name in LABELS else terminal
-
-
-def _label(key: str) -> str:
-    label = LABELS.get(key)
-    if label is None:
-        return key
-    table = key.rpartition(".")[0]
-    return f"{TITLES[table]}: {label}" if table.count(".") else label
+    return PHRASES[name].format(value) if name in PHRASES else label_of(name) if name in labels() else terminal

@@ -27,9 +27,10 @@ from mdp.joint import Joint
 from mdp.overhang import PLATE_TOLERANCE_MM, threshold
 from mdp.save import plane_values
 from mdp.search.plan_file import ZONE_KINDS
+from mdp.search.trial import Trial
 from mdp.zone import AnyZone, Brushed, MeshVolume, Modifier, Zone
 from profiles.material import Material
-from profiles.messages import advice, settings_in, terminal_words
+from profiles.messages import advice, option, settings_in, terminal_words
 from profiles.places import OF_KIND
 from profiles.profile import Profile
 
@@ -199,7 +200,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "refused": _refused(session),
         "units": _units(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
-        "notes": [note for note in bench.notes if bench.rows and advice("parts", bench.parts) not in note],
+        "notes": [_note(note, bench) for note in bench.notes if bench.rows and advice("parts", bench.parts) not in note],
         "laid": _laid(session),
         "given": asdict(bench.given),
         "part_settings": [{"part": own.part, "keys": list(own.process)} for own in bench.profile.parts],
@@ -297,7 +298,8 @@ def _zone(zone: AnyZone) -> dict[str, Any]:
 
 def _modifier(modifier: Modifier) -> dict[str, Any]:
     """The box of a modifier (the bounding box of a mesh), and its settings in words."""
-    volume, settings = modifier.volume, ", ".join(f"{key} = {value}" for key, value in modifier.process.items())
+    volume, given = modifier.volume, modifier.process.items()
+    settings = ", ".join(option("set", f"process.{key}={value}") for key, value in given)
     if isinstance(volume, Zone):
         return {"min_mm": volume.min_mm, "max_mm": volume.max_mm, "axes": volume.axes, "settings": settings}
     low, high = volume.mesh.bounds_mm.tolist()
@@ -335,13 +337,32 @@ def _trial(session: Session) -> dict[str, Any] | None:
     _, cuts, trial = session.trials.trial
     figures = asdict(trial)
     rejected = {"refused": figures.pop("rejected"), "refused_part": figures.pop("rejected_part")}
-    return {"cuts": _cuts(cuts), **figures, **rejected}
+    return {"cuts": _cuts(cuts), **figures, **rejected, "parts": [] if trial.rejected else _part_figures(session.bench, trial)}
+
+
+def _part_figures(bench: Bench, trial: Trial) -> list[list[tuple[str, str]]]:
+    """Names and texts of the figures of each part. The first part, which has no cut, has what the others leave."""
+    others = [part for part in trial.parts if part is not None]
+    volume_mm3 = 0.0 if bench.model is None else bench.model.volume_mm3 - sum(part.volume_mm3 for part in others)
+    support_mm2 = (trial.support_area_mm2 or 0.0) - sum(part.support_mm2 for part in others)
+    cut = [[("seam", f"{part.rim_mm:.0f} mm"), ("cut edge", f"{part.edge_deg:.0f}°")] for part in others]
+    whole = [(volume_mm3, support_mm2), *((part.volume_mm3, part.support_mm2) for part in others)]
+    return [
+        [("volume", f"{volume / 1000.0:.2f} cm³"), ("support", _mm2(support)), *own]
+        for (volume, support), own in zip(whole, [[], *cut], strict=True)
+    ]
 
 
 def _refused(session: Session) -> dict[str, Any] | None:
     """The planes that were refused last, while their page shows the reason."""
     refused = session.trials.refused
     return asdict(refused) if refused is not None and refused.page in session.problems else None
+
+
+def _note(note: str, bench: Bench) -> dict[str, Any]:
+    """A note of the search. parts: the number of parts that it proposes, for a button in place of its last words; 0: none."""
+    parts = next((row.parts for row in bench.rows if note.endswith(advice("parts", row.parts))), 0)
+    return {"text": note.removesuffix(f": {advice('parts', parts)}"), "parts": parts}
 
 
 def _laid(session: Session) -> dict[str, Any] | None:

@@ -10,6 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import product, takewhile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +21,7 @@ from machine.pipeline.pictures import contact_sheet, front_picture, parts_pictur
 from machine.pipeline.project import PICTURE_PX, project_bytes, with_meshes_beside
 from machine.planning.fit import check_parts
 from machine.planning.stops import check_stop_parts
+from machine.quantities import newtons
 from machine.view.encoding import pack
 from machine.view.parts import page_colours
 from machine.view.scene import solids, surfaces
@@ -214,8 +216,16 @@ def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
     `export`."""
     colours = page_colours(len(decomposition.parts))
     records = solids(decomposition, profile, joints_of(decomposition.parts, profile))
-    parts = [part | {"colour": colour} for part, colour in zip(records, colours, strict=True)]
+    parts = [record | _joint_words(record) | {"colour": colour} for record, colour in zip(records, colours, strict=True)]
     return pack({"parts": parts, "fit": page_words(out_of_reach(decomposition.parts, profile))}, surfaces(decomposition, profile))
+
+
+def _joint_words(record: dict[str, Any]) -> dict[str, str]:
+    """Area and load of a part's joint, if it has one, in words."""
+    if (joint := record["joint"]) is None:
+        return {}
+    weakest = ": the weakest" if joint["weakest"] else ""
+    return {"holds": f"{joint['area_mm2']:.1f} mm², breaks at about {newtons(joint['load_n'])} N sideways at the tip{weakest}"}
 
 
 def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:

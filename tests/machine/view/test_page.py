@@ -209,8 +209,9 @@ def test_the_packed_report_tells_the_changed_settings_first(folder: Path) -> Non
     report = opened(Path("a.html").read_bytes())[0]["report"]
     tables = {table["title"]: table for table in report["tables"]}
     changed = {row[0]: row[1:] for row in tables["Settings changed"]["rows"]}
-    assert changed["process.layer_height_mm"] == ["0.4", "0.2"]
-    assert set(changed) == {word.partition("=")[0] for word in COARSE if "=" in word}
+    assert changed["Layer height"] == ["0.4", "0.2"]
+    keys = {row[0]: row[3] for row in tables["All settings"]["rows"]}
+    assert {keys[label] for label in changed} == {word.partition("=")[0] for word in COARSE if "=" in word}
     assert (tables["All settings"]["folded"], tables["Parts"]["folded"]) == (True, False)
 
 
@@ -218,7 +219,7 @@ def test_another_machine_is_held_against_its_own_shipped_values() -> None:
     from machine.view.report import settings_tables
 
     profile = load(machine="fractal5pro", settings=["machine.clearance_mm=3"])
-    assert [row[0] for row in settings_tables(profile)[0]["rows"]] == ["machine.clearance_mm"]
+    assert [row[0] for row in settings_tables(profile)[0]["rows"]] == ["Clearance between head and table"]
 
 
 @pytest.mark.slow

@@ -157,10 +157,10 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
         assert "Search ranking none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
         page.do("search", orient=False)
         as_it_lies = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
-        assert not any("oriented" in note for note in as_it_lies["notes"])
+        assert not any("oriented" in note["text"] for note in as_it_lies["notes"])
         page.do("search", ranker="learned")
         laid = page.until(lambda state: state["rotation"] != as_it_lies["rotation"] and not state["search"])
-        (told,) = (note for note in laid["notes"] if "oriented" in note)
+        (told,) = (note["text"] for note in laid["notes"] if "oriented" in note["text"])
         assert told.startswith("oriented on its front (turned 90 about x): in one piece with 0 mm² of visible marks")
         assert told.endswith("; to keep the file's: Undo, then clear “Also choose the best orientation” and find parts again")
         assert laid["front"][0]["support_area_mm2"] < as_it_lies["front"][0]["support_area_mm2"]

@@ -266,7 +266,7 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
 
 def test_advice_to_take_a_number_of_parts_goes_when_it_is_taken() -> None:
     rows = (FrontRow((), 9.0, 0.0, 9.0, chosen=True), FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0))
-    advised: list[list[str]] = []
+    advised: list[list[dict[str, Any]]] = []
 
     async def work(session: Session) -> None:
         session.do("find", with_front(session.bench, rows, ("no face hangs", f"2 parts would be better: {advice('parts', 2)}")))
@@ -276,7 +276,8 @@ def test_advice_to_take_a_number_of_parts_goes_when_it_is_taken() -> None:
             advised.append(snapshot(session)["notes"])
 
     when_done(work)
-    assert [len(notes) for notes in advised] == [2, 1]
+    hangs = {"text": "no face hangs", "parts": 0}
+    assert advised == [[hangs, {"text": "2 parts would be better", "parts": 2}], [hangs]]
 
 
 def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_begin() -> None:

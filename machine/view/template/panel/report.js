@@ -1,18 +1,9 @@
 // Report: the front of decompositions, figures and tables beside the picture, findings in a list and over it, and the picture that is printed.
 
-import { $, button, findingButton, hide, listen, made, putAt, roughly, rowOf, termsOf } from "../elements.js";
+import { $, button, findingButton, hide, listen, made, putAt, rowOf, termsOf } from "../elements.js";
 import { standing } from "../moves/picture.js";
 import { carried, projected } from "../picture/math.js";
 import { MOST_CUTS } from "../picture/shapes.js";
-
-const orDash = (value, told) => (value === null ? "–" : told(value));
-const FRONT = [
-  ["support mm²", (row) => Math.max(row.support_area_mm2, 0).toFixed(1)],
-  ["seams mm", (row) => row.seam_mm.toFixed(0)],
-  ["stair-stepping mm²", (row) => row.stairs_mm2.toFixed(0)],
-  ["about", (row) => orDash(row.time_s, roughly)],
-  ["filament m", (row) => orDash(row.filament_mm, (length) => (length / 1000).toFixed(1))],
-];
 
 /** The best decomposition for every number of parts: its figures, and how another one than the taken would cut the model. */
 export function frontOf(print, scene) {
@@ -24,7 +15,7 @@ export function frontOf(print, scene) {
     scene.tryRow(row.chosen || !drawable ? null : row);
     showChoice(row, drawable);
   };
-  const head = made("tr", {}, ...["parts", ...FRONT.map(([name]) => name)].map((text) => made("th", { text, scope: "col" })));
+  const head = made("tr", {}, ...["parts", ...front[0].figures.map(([name, , unit]) => `${name} ${unit}`)].map((text) => made("th", { text, scope: "col" })));
   $("front").append(made("thead", {}, head), made("tbody", {}, ...front.map((row, k) => lineOf(row, !row.chosen && !pays(row, front.slice(0, k)), choose))));
   showChoice(front.find((row) => row.chosen) || null);
 }
@@ -35,7 +26,7 @@ const pays = (row, fewer) => fewer.every(({ cost_mm2: cost }) => row.cost_mm2 < 
 function lineOf(row, idle, choose) {
   const mark = made("input", { type: "radio", name: "front", value: row.parts, checked: row.chosen, onchange: () => choose(row) });
   const label = made("label", {}, mark, `${row.parts}`, ...(row.chosen ? [made("b", { text: "✓", title: `chosen: ${row.why}` })] : []));
-  const line = rowOf([label, ...FRONT.map(([, of]) => of(row))]);
+  const line = rowOf([label, ...row.figures.map(([, value]) => value || "–")]);
   line.className = idle ? "idle" : "";
   line.onclick = ({ target }) => { if (!line.cells[0].contains(target)) label.click(); };
   return line;

@@ -1,6 +1,6 @@
 // Parts panel: the search, its front as a slider, and every part as a card, chosen there as in the picture, with keys and a menu for what is done to it.
 
-import { $, alike, button, disable, hide, listen, listIn, made, mm2, needsKey, newtons, partsInWords, putNew, roughly, swatch, tell, tellIn, termsOf, toggle } from "../../../../view/template/elements.js";
+import { $, alike, button, disable, hide, listen, made, needsKey, partsInWords, putNew, swatch, tell, tellIn, termsOf, toggle } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 import { anglesOf, choosePart, figuresNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
@@ -13,11 +13,11 @@ export function partsPanel() {
   const show = () => {
     const { front, parts, recommended, notes } = store.state, place = Math.max(front.findIndex((row) => row.parts === parts), 0);
     update({ row: null });
-    Object.assign($("front"), { max: front.length - 1, value: place, disabled: front.length < 2 });
+    Object.assign($("front"), { max: Math.max(front.length - 1, 0), value: place, disabled: front.length < 2 });
     marksUnder(front, recommended);
-    tellRow(front.find((row) => row.parts === parts) || { parts, planes: null });
-    listIn("front-notes", notes);
-    hide({ recommended: !recommended });
+    tellRow(front.find((row) => row.parts === parts) || { parts, planes: null, figures: [] });
+    putNew($("front-notes"), notes, () => notes.map(noteOf));
+    hide({ recommended: !recommended, "front-stale": front.length > 0 });
   };
   let held = null; // the front whose slider is under the hand: nothing moves it there, not even another front
   const hold = () => { held ||= store.state.front; };
@@ -42,17 +42,15 @@ export function partsPanel() {
     update({ row: null });
     ask({ do: "take", parts }, (refusal) => { if (refusal && !held && store.state.front.length) show(); });
   } });
-  onState(({ front, search, parts }) => {
+  onState(({ search, parts }) => {
     disable({ find: Boolean(search) });
-    hide({ stop: !search, "front-field": !front.length });
+    hide({ stop: !search, "front-field": !parts });
     tell({ "search-told": search ? search.text : "" });
     toggle("no-cuts", !parts);
   });
   onNew(({ front, parts, recommended, cuts, priced, notes, by_hand: own }) => [front, parts, recommended, cuts, priced, notes, own], ([front]) => {
-    if (!front.length) {
-      held = null;
-      if (store.row) update({ row: null });
-    } else if (!held) show();
+    if (!front.length) held = null;
+    if (!held) show();
     else if (store.row) follow(store.row);
   });
 }
@@ -60,17 +58,18 @@ export function partsPanel() {
 const marksUnder = (front, best) => $("front-marks").replaceChildren(...front.map(({ parts }) => (
   made("span", parts === best ? { text: `${parts} ✓`, className: "recommended", title: "recommended" } : { text: parts }))));
 
+/** A note of the search, with a button for what it proposes. */
+const noteOf = ({ text, parts }) => made("li", {}, text, ...(parts ? [button(`Choose ${partsInWords(parts)}`, () => send({ do: "take", parts }))] : []));
+
 function tellRow(row) {
-  const { recommended, parts, cuts, priced, by_hand: own } = store.state;
-  const byHand = row.parts === parts && !alike(row.planes, cuts), best = row.parts === recommended;
-  const figures = byHand ? own || {} : row, unknown = byHand && !own ? "…" : priced ? "–" : "worked out anew …";
-  const figure = (key, told) => (Number.isFinite(figures[key]) ? told(figures[key]) : unknown);
+  const { front, recommended, parts, cuts, priced, by_hand: own } = store.state;
+  const byHand = front.length > 0 && row.parts === parts && !alike(row.planes, cuts), best = row.parts === recommended;
+  const figures = byHand ? own?.figures || front[0].figures.map(([name]) => [name, ""]) : row.figures, unknown = byHand && !own ? "…" : priced ? "–" : "worked out anew …";
   $("front").setAttribute("aria-valuetext", partsInWords(row.parts) + (best ? ", recommended" : ""));
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [
-    ["parts", `${row.parts}${byHand ? ", changed by hand since" : best ? ` (recommended: ${row.why})` : ""}`], ["area to support", figure("support_area_mm2", mm2)],
-    ["seams", figure("seam_mm", (long) => `${long.toFixed(0)} mm`)], ["stair-stepping", figure("stairs_mm2", mm2)], ["takes about", figure("time_s", roughly)],
-    ["plastic", figure("filament_mm", (long) => `${(long / 1000).toFixed(1)} m`)],
+    ["parts", `${row.parts}${byHand ? ", changed by hand since" : best ? ` (recommended: ${row.why})` : ""}`],
+    ...figures.map(([name, value, unit]) => [name, value ? `${value} ${unit}`.trimEnd() : unknown]),
   ]);
 }
 
@@ -82,21 +81,13 @@ function directionInWords(direction) {
   return tilt < 0.05 ? "straight up" : `${Number(tilt.toFixed(1))}° to the ${SIDES[(Math.round(towards / 45) + 8) % 8]}`;
 }
 
-/** Volume and support of every part, rim and edge of those with a plane; undefined: not known. The first part is what the others leave. */
-function partsFigures() {
-  const { state: { model, parts } } = store, figures = figuresNow(), others = (figures?.parts || []).slice(0, parts - 1);
-  const sum = (key) => others.reduce((total, part) => total + part?.[key], 0);
-  if (!figures || others.length < parts - 1) return Array.from({ length: parts }, () => ({}));
-  return [{ volume_mm3: model.volume_mm3 - sum("volume_mm3"), support_mm2: figures.support_area_mm2 - sum("support_mm2") }, ...others.map((part) => part || {})];
-}
+const UNKNOWN = ["volume", "support", "seam", "cut edge"].map((name) => [name, "–"]);
 
-/** What a card tells: icons, names and texts; the first part has neither cut nor joint. */
-function figuresOn(number, { volume_mm3: volume, support_mm2: support, rim_mm: rim, edge_deg: edge }) {
-  const told = (value, words) => (Number.isFinite(value) ? words(value) : "–"), joint = !store.hand && store.pieces?.parts.find(({ part }) => part.index === number)?.part.joint;
-  const own = [["volume", "volume", told(volume, (mm3) => `${(mm3 / 1000).toFixed(2)} cm³`)], ["support", "support", told(support, mm2)]];
-  const cut = [["seam", "seam", told(rim, (mm) => `${mm.toFixed(0)} mm`)], ["edge", "cut edge", told(edge, (deg) => `${deg.toFixed(0)}°`)]];
-  const words = joint ? `${mm2(joint.area_mm2)}, breaks at about ${newtons(joint.load_n)} sideways at the tip${joint.weakest ? ": the weakest" : ""}` : "–";
-  return number > 1 ? [...own, ...cut, [joint?.weakest ? "joint weakest" : "joint", "joint", words]] : own;
+/** Classes, names and texts of a card's rows; the first part has neither cut nor joint. */
+function cardRows(number) {
+  const figures = figuresNow()?.parts[number - 1] || UNKNOWN.slice(0, number > 1 ? 4 : 2), piece = store.hand ? null : store.pieces?.parts.find(({ part }) => part.index === number)?.part;
+  const rows = figures.map(([name, text]) => [`icon-${name.split(" ").at(-1)}`, name, text]);
+  return number > 1 ? [...rows, [piece?.joint?.weakest ? "icon-joint weakest" : "icon-joint", "joint", piece?.holds || "–"]] : rows;
 }
 
 /** A part as a card: chosen by a click or the keyboard, its plane locked by a switch. */
@@ -105,7 +96,7 @@ function partCard(number, figures) {
   const words = made("small", { text: directionInWords(planesNow()[number - 2]?.normal || [0, 0, 1]), className: "words" });
   const locked = isLocked(number), lock = { type: "checkbox", name: `lock-${number}`, checked: locked, className: `lock icon-${locked ? "locked" : "unlocked"}` };
   const more = { ariaLabel: `lock the plane of part ${number}`, title: "Locked, a search leaves its plane as it is", onchange: ({ target }) => lockPart(number, target.checked) };
-  const rows = figuresOn(number, figures).map(([icon, name, text]) => made("div", { className: `icon-${icon}` }, ...termsOf([[name, text]])));
+  const rows = figures.map(([className, name, text]) => made("div", { className }, ...termsOf([[name, text]])));
   const name = made("label", {}, choose, swatch(store.state.colours[number - 1]), made("span", {}, made("b", { text: `Part ${number}` }), words));
   const card = made("div", { className: "card" }, name, ...(number > 1 ? [made("input", { ...lock, ...more })] : []), made("dl", {}, ...rows));
   card.oncontextmenu = (event) => { event.preventDefault(); openMenu(number, event.clientX, event.clientY); };
@@ -121,9 +112,9 @@ export function partsList() {
     removePart(store.part);
   });
   menuKeys();
-  subscribe(({ state, part, pieces }) => {
-    const figures = partsFigures();
-    putNew($("parts-list"), [figures, state.locked, state.parts, state.colours, planesNow(), part, Boolean(pieces)], () => figures.map((own, k) => partCard(k + 1, own)));
+  subscribe(({ state: { locked, parts, colours }, part }) => {
+    const figures = Array.from({ length: parts }, (_, k) => cardRows(k + 1));
+    putNew($("parts-list"), [figures, locked, colours, planesNow(), part], () => figures.map((rows, k) => partCard(k + 1, rows)));
   });
 }
 

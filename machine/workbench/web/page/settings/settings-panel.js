@@ -41,6 +41,7 @@ export function settingsPanel() {
     const words = sought(), rows = settings.filter(shown).sort((a, b) => farFrom(a, words) - farFrom(b, words)), changed = settings.filter((setting) => setting.changed), open = changedOnly || words.length > 0;
     if (changedOnly && !changed.length) return showChanged(false);
     tell({ "settings-count": rows.length ? `${rows.length} of ${settings.length} settings` : "No setting matches.", "only-changed": `${changed.length} changed` });
+    hide({ "modifier-help": !words.some((word) => word.startsWith("modif")) });
     disable({ "only-changed": !changed.length, "reset-settings": !changed.length });
     tellTakeBack(changed, part());
     for (const level of LEVELS) pressed(`level-${level}`, kept.now.level === level);
