@@ -10,7 +10,7 @@ const fake = (() => {
       id, hidden: id === "emergency", textContent: "", value: "", dataset: {}, options: [], children: [], contentWindow: { addEventListener() {} },
       addEventListener: (event, act) => { (listeners[event] ||= []).push(act); },
       fire: (event) => (listeners[event] || []).forEach((act) => act({ target: {} })),
-      setAttribute() {}, getAttribute() {}, append() {}, querySelector: () => element(""), querySelectorAll: () => [],
+      setAttribute() {}, getAttribute() {}, append() {}, hidePopover() {}, querySelector: () => element(""), querySelectorAll: () => [],
       replaceChildren(...children) { this.children = children; },
     };
   }

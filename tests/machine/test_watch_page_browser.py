@@ -49,7 +49,7 @@ def test_a_print_is_paused_resumed_and_stopped_by_buttons(browser: Browser, tmp_
         browser.wait(f"{LIVE}.startsWith('printing') && !document.querySelector('[data-order=pause]').hidden")
         browser.click("#cancel")
         browser.click("#go-on")
-        browser.wait("$('sure').hidden")
+        browser.wait("!$('sure').matches(':popover-open')")
         browser.click("#cancel")
         browser.click("[data-order=cancel]")
         assert process.wait(PATIENCE_S) == 130

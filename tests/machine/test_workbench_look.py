@@ -70,8 +70,8 @@ def test_earlier_work_is_offered_where_nothing_is_open_and_under_model_else(brow
         root = own.place.rsplit("/", 2)[0]
         assert own.ask(f"{root}/benches/1", "DELETE", Origin=f"http://127.0.0.1:{own.port}")[0] == 200
         browser.open(f"http://127.0.0.1:{own.port}{root}/")
-        browser.wait("$('drop').textContent.includes('demo:bracket') && $('kept-works').checkVisibility()")
-        browser.click("#kept-works button")
+        browser.wait("$('drop').textContent.includes('demo:bracket') && $('kept-list').checkVisibility()")
+        browser.click("#kept-list button")
         browser.wait("$('title').textContent === 'demo:bracket' && $('earlier-work').contains($('kept-field'))")
 
 

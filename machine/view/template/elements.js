@@ -63,9 +63,6 @@ export function duration(seconds) {
   return hours ? `${hours}h ${minutes}m ${rest}s` : minutes ? `${minutes}m ${rest}s` : `${rest}s`;
 }
 
-/** The same where a minute more or less is nothing. */
-export const roughly = (seconds) => (seconds < 60 ? duration(seconds) : duration(60 * Math.round(seconds / 60)).replace(/ 0s$/, ""));
-
 export const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
 
 /** Dark or light, as changed(dark) is told: what the system prefers until a person says otherwise, by the button or what this gives. */

@@ -24,6 +24,7 @@ from machine.printing.history import past_prints
 from machine.printing.job import PrintJob
 from machine.printing.journal_folder import ResumableJournal, resumable_journals
 from machine.printing.ports import answer_words, ask_ports, known_ports, port_json
+from machine.quantities import about
 from machine.workbench.printing.running_print import RunningPrint
 from machine.workbench.session.base import Observable
 from profiles.errors import OutputError, PrinterError
@@ -73,7 +74,7 @@ class Prints(Observable):
             "asking": self._over is not None,
             "last_printer": printer_json(self._last_printer) if self._last_printer else None,
             "journals": self._journals_state(),
-            "history": self._history,
+            "history": [past_row(past) for past in self._history],
             "prints": [
                 {**job.state.json(), "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
                 for job in self.prints
@@ -202,6 +203,13 @@ def _same(a: Destination, b: Destination) -> bool:
     if isinstance(a, Server) and isinstance(b, Server):
         return a.url == b.url
     return stable_name(a.name) == stable_name(b.name)
+
+
+def past_row(past: dict[str, Any]) -> dict[str, Any]:
+    """Name, outcome, time and filament of a past print as texts, and when it began, which the browser shows in its own time zone."""
+    seconds, metres = past["seconds"], past["filament_m"]
+    time, filament = "–" if seconds is None else about(seconds), "–" if metres is None else f"{metres:.1f} m"
+    return {"cells": [past["name"], past["outcome"], time, filament], "begun": past["begun"]}
 
 
 def last_printer() -> Destination | None:

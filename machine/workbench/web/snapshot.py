@@ -37,6 +37,7 @@ from profiles.profile import Profile
 MOST_STEPS_LISTED = 30  # of those that can be undone, or done again
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 MOST_FACES = 2_000_000  # limit for drawing
+MODIFIER_MARGIN_MM = 3.0  # beyond the model's diagonal, to which the boxes of modifiers are shown
 SAME_UP = 1e-6  # between the directions of two orientations that differ by a turn about z
 # Text of a button, and its command.
 SLICE_AGAIN = {"text": "Slice again", "command": {"do": "slice"}}
@@ -195,7 +196,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "locked": [part in bench.locked for part in bench.cuts or ()],
         "trial": _trial(session),
         "zones": _zones(bench),
-        "modifiers": [_modifier(modifier) for modifier in bench.zones.modifiers],
+        "modifiers": [_modifier(modifier, bench.model) for modifier in bench.zones.modifiers],
         "marks": marks_key(bench),
         "refused": _refused(session),
         "units": _units(session),
@@ -296,12 +297,14 @@ def _zone(zone: AnyZone) -> dict[str, Any]:
     return asdict(zone.box if isinstance(zone, MeshVolume) else zone)
 
 
-def _modifier(modifier: Modifier) -> dict[str, Any]:
-    """The box of a modifier (the bounding box of a mesh), and its settings in words."""
+def _modifier(modifier: Modifier, model: Model | None) -> dict[str, Any]:
+    """The box of a modifier (the bounding box of a mesh), limited to the model's surroundings, and its settings in words."""
     volume, given = modifier.volume, modifier.process.items()
     settings = ", ".join(option("set", f"process.{key}={value}") for key, value in given)
     if isinstance(volume, Zone):
-        return {"min_mm": volume.min_mm, "max_mm": volume.max_mm, "axes": volume.axes, "settings": settings}
+        reach_mm = np.linalg.norm(model.size_mm) + MODIFIER_MARGIN_MM if model is not None else np.inf
+        low, high = (np.clip(corner, -reach_mm, reach_mm).tolist() for corner in (volume.min_mm, volume.max_mm))
+        return {"min_mm": low, "max_mm": high, "axes": volume.axes, "settings": settings}
     low, high = volume.mesh.bounds_mm.tolist()
     return {"min_mm": low, "max_mm": high, "axes": None, "settings": f"{volume.file.name}: {settings}"}
 

@@ -140,8 +140,8 @@ def test_a_page_of_a_killed_workbench_says_what_to_do_and_the_next_one_offers_it
         assert problem.endswith("Another one is here now: open the address that its terminal has told.")
         browser.open(running.address)
         browser.wait("!$('left-field').hidden")
-        assert browser.value("$('left-files').querySelector('button span').textContent") == "tee.stl"
-        browser.click("#left-files button")
+        assert browser.value("$('left-list').querySelector('button span').textContent") == "tee.stl"
+        browser.click("#left-list button")
         browser.wait("$('title').textContent === 'tee.stl'")
         assert browser.complaints == []
 

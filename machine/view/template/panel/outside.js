@@ -52,12 +52,9 @@ export function follow(scene, player) {
   ask();
 }
 
-/** The buttons, which do what keys in the terminal do; a cancel is asked about once more, an emergency stop is not. */
+/** The buttons, which do what keys in the terminal do; a cancel is confirmed in a popover, an emergency stop is not. */
 function orders() {
-  const sure = (asked) => hide({ sure: !asked, cancel: asked });
-  listen("click", { cancel: () => sure(true), "go-on": () => sure(false) });
   onData("order", async ({ order }) => {
-    sure(false);
     const answer = await fetch(`order/${order}`, { method: "POST" }).catch(() => null);
     if (!answer?.ok) tell({ live: NOT_ARRIVED });
   });

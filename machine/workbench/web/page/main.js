@@ -40,7 +40,7 @@ function main() {
   subscribe((now, before) => { if (now.line !== before.line) onlyWithLine(now.line === "open"); });
   onState(({ note }) => notice(note, "note"));
   slicesPanel(printFrame(camera, picture));
-  const panels = [problemLine, elapsedTimes, historyMenu, previewOf, benchesPanel, devicesPanel, platePanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
+  const panels = [problemLine, elapsedTime, historyMenu, previewOf, benchesPanel, devicesPanel, platePanel, modelPanel, sizePanel, partsPanel, planesPanel, partsList, marksPanel, stopsPanel, comparePanel, saveMenu, settingsPanel];
   for (const begin of [...panels, printPanel, clicksOf, modelOf, placePanel, thumbnailsOf, apartPanel]) begin(picture);
   if (picture) {
     const ringPlaces = ringsOf(picture);
@@ -62,10 +62,10 @@ function main() {
   root.dataset.state = picture ? "ready" : "failed";
 }
 
-function tellState({ model, busy, undo, redo, search, slicing, preparing, machine, material, process }) {
+function tellState({ model, busy, undo, redo, search, slicing, comparing, preparing, machine, material, process }) {
   const root = document.documentElement;
   tellTitle({ model: model ? model.name : "" });
-  const summary = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : preparing ? "preparing the model for planes …" : `${machine.name} · ${material} · ${process}`;
+  const summary = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : comparing || (preparing ? "preparing the model for planes …" : `${machine.name} · ${material} · ${process}`);
   tell({ title: model ? model.name : "tiltprint", summary });
   hide({ drop: Boolean(model || busy) });
   root.dataset.busy = busy;
@@ -111,21 +111,18 @@ function previewOf() {
   });
 }
 
-const MOMENT_S = 2;
-const WORK = {
-  "summary": ({ busy, search, slicing, preparing }) => busy || (search ? "search" : slicing ? "slicing" : preparing ? "planes" : ""),
-  "search-told": ({ search }) => (search ? "search" : ""), "slicing-told": ({ slicing }) => (slicing ? "slicing" : ""), "comparing-told": ({ comparing }) => (comparing ? "comparing" : ""),
-};
+const MOMENT_S = 2; // from which on the time is shown
+const PROGRESS = ["summary", "search-told", "slicing-told", "comparing-told"];
 
-/** How long work has been under way, beside what it tells of itself, as soon as that is longer than a moment. */
-function elapsedTimes() {
-  const begun = new Map(); // element -> {work, at}
-  const show = () => store.line === "open" && begun.forEach(({ work, at }, id) => {
-    const seconds = (performance.now() - at) / 1000;
-    $(id).dataset.elapsed = work && seconds >= MOMENT_S ? ` ${duration(seconds)}` : "";
-  });
-  onState((state) => {
-    for (const [id, of] of Object.entries(WORK)) if (begun.get(id)?.work !== of(state)) begun.set(id, { work: of(state), at: performance.now() });
+/** How long the present task has taken, after its progress texts. */
+function elapsedTime() {
+  let task = "", start = 0;
+  const show = () => {
+    const seconds = (performance.now() - start) / 1000, text = task && seconds >= MOMENT_S ? ` ${duration(seconds)}` : "";
+    if (store.line === "open") for (const id of PROGRESS) $(id).dataset.elapsed = $(id).textContent && text;
+  };
+  onNew((state) => state.busy || ["search", "slicing", "comparing", "preparing"].find((name) => state[name]) || "", (now) => {
+    [task, start] = [now, performance.now()];
     show();
   });
   setInterval(show, 1000);

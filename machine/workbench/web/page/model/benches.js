@@ -91,25 +91,18 @@ export function benchesPanel() {
   });
 }
 
-const OFFERS = { // most: entries that are listed, until all of them are asked for
-  kept: { list: "kept-works", most: 5, wordsOf: ({ parts, written_s: written }) => [parts ? partsInWords(parts) : "uncut", moment(written)] },
-  left: { list: "left-files", most: 5, wordsOf: ({ bytes, written_s: written }) => [`${Math.ceil(bytes / 1000).toLocaleString("en")} kB`, moment(written)] },
-};
-
-/** What is there from earlier, the newest first: work that was kept, or files that a workbench has left which was killed; at first the newest of each name. */
+/** List what an earlier run has left, the newest first: autosaved work ("kept"), or the files of a killed workbench ("left"). */
 export async function offer(what) {
-  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [], { list, most } = OFFERS[what];
-  const shown = most < Infinity ? found.filter(({ name }, k) => found.findIndex((one) => one.name === name) === k).slice(0, most) : found;
-  const rows = shown.map((one) => ({ id: `${one.key}`, told: JSON.stringify(one), make: () => offerRow(what, one) }));
-  const showAll = () => { OFFERS[what].most = Infinity; offer(what); }, all = { id: "/all", told: `${found.length}`, make: () => made("li", {}, button(`Show all ${found.length}`, showAll)) };
+  const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [];
   hide({ [`${what}-field`]: !found.length });
-  putRows(shown.length < found.length ? [...rows, all] : rows, $(list));
+  putRows(found.map((file) => ({ id: `${file.key}`, told: JSON.stringify(file), make: () => offerRow(what, file) })), $(`${what}-list`));
 }
 
-/** Its buttons: it is opened, or removed; a refusal comes by the line. */
-function offerRow(what, one) {
-  const name = one.name || "cannot be read here", words = OFFERS[what].wordsOf(one).join(", "), act = (method) => () => fetch(`${what}/${one.key}`, { method }).then(() => offer(what), () => {});
-  return made("li", {}, button("", act("POST"), {}, made("span", { text: name }), made("small", { text: words })), removeButton(`Remove ${name}, ${words}`, act("DELETE")));
+/** Buttons that open or remove a file; a refusal arrives by the connection. */
+function offerRow(what, { key, name = "", bytes, parts, written_s: written }) {
+  const act = (method) => () => fetch(`${what}/${key}`, { method }).then(() => offer(what), () => {});
+  const title = name || "cannot be read here", size = bytes ? `${Math.ceil(bytes / 1000).toLocaleString("en")} kB` : parts ? partsInWords(parts) : "uncut", words = `${size}, ${moment(written)}`;
+  return made("li", {}, button("", act("POST"), {}, made("span", { text: title }), made("small", { text: words })), removeButton(`Remove ${title}, ${words}`, act("DELETE")));
 }
 
 /** On this computer's page, where the workbench is open to the network: which devices are paired, each with a button that lets it go. */

@@ -1,6 +1,6 @@
 // Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
-import { $, alike, button, fill, listen, made, numberIn, putAt, putTable, removeButton, rowOf, swatch, tell } from "../../../../view/template/elements.js";
+import { $, alike, fill, listen, made, numberIn, putAt, putTable, removeButton, rowOf, swatch, tell } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
 import { boxCorners, boxEdges, trianglesOf, wordOf } from "../../../../view/template/picture/shapes.js";
 import { newest, send } from "../line.js";
@@ -14,8 +14,7 @@ const MARK_KINDS = {
 };
 const MODIFIER = { word: "modifier", colour: [84, 92, 104] }; // of a plan or a model file: shown, not changed
 const KIND_NAMES = Object.keys(MARK_KINDS); // their places are the bits of a face's byte
-const BOX_SIDES = [0, 1, 2].flatMap((axis) => [{ axis, end: "min_mm", name: `least ${"xyz"[axis]}` }, { axis, end: "max_mm", name: `greatest ${"xyz"[axis]}` }]);
-const BEYOND_MM = 3; // of the model's box, to which modifiers without sides are drawn
+const BOX_SIDES = [0, 1, 2].flatMap((axis) => ["min_mm", "max_mm"].map((end) => ({ axis, end }))); // as the page has handles and numbers
 const PAINT = 0.6; // faces are painted in darker colours, which no part has
 const AROUND_MM = 1; // of the corners that are clicked, so that a box reaches through the surface
 const THINNEST_MM = 0.2, STEP_MM = 0.5;
@@ -43,13 +42,6 @@ export const markWord = () => MARK_KINDS[kindNow()].word;
 const fine = (place) => place.map((x) => Math.round(1000 * x) / 1000);
 
 const boxes = () => store.state.zones.filter((zone) => zone.min_mm).map((zone) => (sameMark(store.zoneHand, zone) ? store.zoneHand : zone));
-/** The boxes of modifiers as far as the model reaches. */
-function modifiers() {
-  const size = modelSize(store.state), far = Math.hypot(...size) + BEYOND_MM;
-  const reach = (axes, axis) => (axes || axis === 2 ? far : size[axis] / 2 + BEYOND_MM);
-  const within = (corner, axes) => corner.map((x, axis) => Math.max(-reach(axes, axis), Math.min(reach(axes, axis), x)));
-  return store.state.modifiers.map((own) => ({ ...own, min_mm: within(own.min_mm, own.axes), max_mm: within(own.max_mm, own.axes) }));
-}
 const boxNow = () => boxes().find((zone) => sameMark(zone, store.zone)) || null;
 const facesNow = () => store.state.zones.find((zone) => sameMark(zone, store.zone) && zone.point_mm);
 
@@ -75,11 +67,13 @@ function putBox(zone) {
   send({ do: "mark", kind: zone.kind, number: zone.number, min_mm: fine(zone.min_mm), max_mm: fine(zone.max_mm), axes: zone.axes || null });
 }
 
-/** A box with one side somewhere else, never thinner than it can be. */
-function withSide(zone, { axis, end }, at) {
-  const limit = end === "min_mm" ? zone.max_mm[axis] - THINNEST_MM : zone.min_mm[axis] + THINNEST_MM;
-  const value = end === "min_mm" ? Math.min(at, limit) : Math.max(at, limit);
-  return { ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) };
+/** A box with another value of one side. */
+const withSide = (zone, { axis, end }, value) => ({ ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) });
+
+/** The same, but never thinner than it can be. */
+function draggedSide(zone, side, at) {
+  const { axis, end } = side;
+  return withSide(zone, side, end === "min_mm" ? Math.min(at, zone.max_mm[axis] - THINNEST_MM) : Math.max(at, zone.min_mm[axis] + THINNEST_MM));
 }
 
 const sidePlace = (zone, { axis, end }) => fromBox(zone, [0, 1, 2].map((k) => (k === axis ? zone[end][k] : (zone.min_mm[k] + zone.max_mm[k]) / 2)));
@@ -101,9 +95,11 @@ export function marksPanel(picture) {
     const [x, y, z] = modelSize(store.state), low = store.state.pedestal_mm;
     addBox([-x / 6, -y / 6, low + z / 3], [x / 6, y / 6, low + (2 * z) / 3]);
   } });
-  const knobs = BOX_SIDES.map((side) => knobOf(side, picture)), numbers = BOX_SIDES.map(numberOf);
-  $("mark-handles").replaceChildren(...knobs);
-  $("mark-numbers").replaceChildren(...numbers.map((input, k) => made("label", {}, `${BOX_SIDES[k].name} `, input)));
+  const knobs = [...$("mark-handles").children], numbers = [...$("mark-numbers").querySelectorAll("input")];
+  BOX_SIDES.forEach((side, k) => {
+    gripSide(knobs[k], side, picture);
+    numbers[k].onchange = () => { if (boxNow()) putBox(withSide(boxNow(), side, Number(numbers[k].value))); };
+  });
   picture?.drawn.push(() => {
     const zone = store.tab === "parts" && store.triangles ? boxNow() : null;
     $("mark-handles").hidden = !zone;
@@ -134,35 +130,22 @@ export function marksPanel(picture) {
 
 /** Boxes and marked faces in the picture, where parts are looked at. */
 function showMarks(picture) {
-  const { tab, state, zone: chosen, faceMarks } = store, seen = tab === "parts" && state.model ? [...modifiers(), ...boxes()] : [];
+  const { tab, state, zone: chosen, faceMarks } = store, seen = tab === "parts" && state.model ? [...state.modifiers, ...boxes()] : [];
   picture.extra("marks", JSON.stringify([seen, chosen]), () => seen.flatMap((zone) => boxDrawn(zone, sameMark(zone, chosen))));
   picture.marks(tab === "parts" ? faceMarks : null);
 }
 
-const sideTitle = ({ axis, end }) => `${end} ${axis}`;
-
-/** A knob that moves one side of the chosen box. */
-function knobOf(side, picture) {
-  const knob = button("xyz"[side.axis] + (side.end === "min_mm" ? "−" : "+"), null, { ariaLabel: `${side.name} of the box: drag, or arrow keys` });
-  knob.dataset.side = sideTitle(side);
-  gripOf(knob, {
+/** Has a handle move one side of the chosen box. */
+function gripSide(handle, side, picture) {
+  gripOf(handle, {
     take: (event) => {
       const zone = boxNow(), along = alongWay(picture, sidePlace(zone, side), axesOf(zone)[side.axis], event);
-      return along && ((later) => withSide(zone, side, zone[side.end][side.axis] + along(later)));
+      return along && ((later) => draggedSide(zone, side, zone[side.end][side.axis] + along(later)));
     },
     hold: holdBox, drop: () => holdBox(null),
     put: () => { if (store.zoneHand) putBox(store.zoneHand); },
-    step: (sign) => withSide(boxNow(), side, boxNow()[side.end][side.axis] + sign * STEP_MM),
+    step: (sign) => draggedSide(boxNow(), side, boxNow()[side.end][side.axis] + sign * STEP_MM),
   });
-  return knob;
-}
-
-/** A field for one side of the chosen box. */
-function numberOf(side) {
-  const { axis, end, name } = side, typed = (zone, value) => ({ ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) });
-  const input = made("input", { type: "number", step: STEP_MM, ariaLabel: `${name}, mm`, onchange: () => { if (boxNow()) putBox(typed(boxNow(), Number(input.value))); } });
-  input.dataset.side = sideTitle(side);
-  return input;
 }
 
 /** What a box looks like: its sides let the light through; the edges of the chosen one are seen through all. */

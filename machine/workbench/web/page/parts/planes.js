@@ -187,7 +187,6 @@ export function handlesOf(picture) {
   });
 }
 
-const MOVED_MM = 0.01, MOVED_DEG = 0.05; // less is not told
 const REFUSAL_MS = 6000; // for which it is told after the plane is let go
 let refusal = { part: 0, text: "", until: 0 }; // why a plane could not be moved, the last one
 
@@ -203,7 +202,6 @@ function refusalNow({ hand, part, state: { refused, problem } }) {
 
 /** The chosen part's plane: numbers, snaps, and what order it is printed in; new planes, and what becomes of those in a hand. */
 export function planesPanel(picture) {
-  let moved = { text: "", cuts: [] }; // what is told of a plane that was put near, as long as the planes are these
   const byPlane = (event, acts) => Object.entries(acts).forEach(([id, act]) => listen(event, { [id]: () => { if (planeNow()) act(store.part); } }));
   /** The chosen plane with another normal, turned about the middle of its cut. */
   const lean = (tilt, towards) => {
@@ -216,13 +214,9 @@ export function planesPanel(picture) {
     const before = store.state.cuts;
     ask({ ...command, near: true }, (refusal) => {
       const { cuts } = store.state, k = cuts.findIndex((plane) => !before.some((other) => alikePlanes(plane, other)));
-      if (refusal || k < 0) return;
-      choosePart(k + 2);
-      moved = { text: movedInWords(command, cuts[k]), cuts };
-      tellPlane();
+      if (!refusal && k >= 0) choosePart(k + 2);
     });
   };
-  const tellPlane = () => tellAll(alike(moved.cuts, store.state.cuts) ? moved.text : "");
   const leanAsTyped = () => lean(numberIn("plane-tilt"), numberIn("plane-towards"));
   byPlane("click", {
     remove: removePart, lock: (part) => lockPart(part, !isLocked()), neck: (part) => send({ do: "neck", part }), "all-above": () => cutLimb(null), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1),
@@ -238,7 +232,7 @@ export function planesPanel(picture) {
     if (trial && trial !== before?.trial && !trial.refused && alike(trial.cuts, cuts)) update({ figures: trial });
     if (hand) followHand(state, before);
   });
-  subscribe(tellPlane);
+  subscribe(tellAll);
 }
 
 /** The command for a level plane half way up, for a part printed after the one that is chosen. */
@@ -247,14 +241,7 @@ function newPlane(picture) {
   return { do: "add", after: planeNow() ? part : Math.max(state.parts, 1), normal: [0, 0, 1], offset_mm: Math.round((least[2] + most[2]) * 5) / 10 };
 }
 
-/** How far from where it was wanted a plane stands. */
-function movedInWords({ normal, offset_mm: wanted }, there) {
-  const far = there.offset_mm - wanted, leans = Math.acos(Math.min(dot(normal, there.normal) / Math.hypot(...normal), 1)) / RAD;
-  if (leans > MOVED_DEG) return `It leans by ${leans.toFixed(0)}°: nowhere along its own direction can it be cut.`;
-  return Math.abs(far) < MOVED_MM ? "" : `It stands ${Math.abs(far).toFixed(2)} mm ${far > 0 ? "farther up" : "farther down"} than asked for: the nearest place where it can be cut.`;
-}
-
-function tellAll(moved) {
+function tellAll() {
   const { state: { locked, search, cuts }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store);
   disable({ "find-others": Boolean(search) || !locked.some(Boolean) });
   hide({ plane: !plane, "plane-tools": !plane || tab !== "parts" || Boolean(search) });
@@ -271,7 +258,7 @@ function tellAll(moved) {
   $("plane-told").classList.toggle("refused", Boolean(why));
   const told = why ? why : !figures || !cuts.length ? ""
     : `${mm2(figures.support_area_mm2)} to support, ${figures.seam_mm.toFixed(0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
-  tell({ "plane-told": told, "plane-moved": moved, "plane-name": `Part ${part}` });
+  tell({ "plane-told": told, "plane-name": `Part ${part}` });
 }
 
 const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marked

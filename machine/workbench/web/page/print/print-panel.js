@@ -5,7 +5,7 @@
 import { $, alike, disable, hide, listen, made, needsKey, notice, numberIn, onData, pressed, putNew, sayIn, tell, toggle, withWholeOptions } from "../../../../view/template/elements.js";
 import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
-import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showHistory, showPrint, showProgress, showWhich, silence, sure, tellTitle, webcamPanel } from "./print-shown.js";
+import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showHistory, showPrint, showProgress, showWhich, silence, tellTitle, webcamPanel } from "./print-shown.js";
 
 const frame = $("print-page"), heard = {}; // heard: what is done at what the page of the print says
 const post = (tiltprint, more = {}) => frame.contentWindow.postMessage({ tiltprint, ...more }, location.origin);
@@ -239,14 +239,14 @@ export function printPanel() {
     hand: () => { send({ do: "hand", ...where() }); unforce(); },
     "follow-server": () => send({ do: "follow", port: port() }),
     "go-on-with": () => send({ do: "go_on", ...where(), journal: chosenOr("journal", "journal-typed"), machine: $("rest-machine").value.trim() }),
-    cancel: () => { sure(true); $("go-on").focus(); }, "go-on": () => sure(false), begin: askToNotify,
+    begin: askToNotify,
   });
-  onData("print", ({ print: name }) => { sure(false); toldTo({ do: name }); }, $("run"));
+  onData("print", ({ print: name }) => toldTo({ do: name }), $("run"));
   onData("babystep", ({ babystep }) => toldTo({ do: "babystep", by_mm: Number(babystep) }), $("run"));
   webcamPanel(print);
   handPanel((asked) => toldTo({ do: "by_hand", ...asked }));
   listen("toggle", { "rest-field": () => { if ($("rest-field").open) send({ do: "journals" }); } });
-  listen("change", { which: () => { chosen = numberIn("which"); sure(false); show(state); } });
+  listen("change", { which: () => { chosen = numberIn("which"); show(state); } });
   for (const id of ["feed", "flow"]) {
     const letGo = () => delete $(id).dataset.held;
     listen("input", { [id]: () => { $(id).dataset.held = true; tell({ [`${id}-told`]: `${$(id).value} %` }); } });

@@ -1,6 +1,6 @@
 // Print shown: a print's checks, its progress and its end, the bar on every tab, what is told outside the page, and its printer: by hand, by its camera, in a graph.
 
-import { $, clock, duration, hide, listen, listIn, moment, onData, optionsOf, putNew, putTable, roughly, rowOf, tell, tellIn } from "../../../../view/template/elements.js";
+import { $, clock, duration, hide, listen, listIn, moment, onData, optionsOf, putNew, putTable, rowOf, tell, tellIn } from "../../../../view/template/elements.js";
 import { keptInTab } from "../store.js";
 
 const SILENT_MS = 5000; // a print that goes on is told five times a second
@@ -23,8 +23,6 @@ export function silence({ number, is_over: over, live }) {
   return !over && live && past > SILENT_MS ? `nothing heard of it for ${Math.floor(past / 1000)} s` : "";
 }
 
-export const sure = (whether) => hide({ sure: !whether });
-
 export function showWhich(prints, chosen) {
   hide({ "which-line": prints.length < 2 });
   const entries = prints.map((job) => [job.number, `${job.name} at ${job.port}: ${job.state}`]);
@@ -46,7 +44,7 @@ export function showPrint(print, commands) {
     "run-ask": state !== "ready" || !commands, "run-live": !live && !uploads, "run-upload": !uploads || !commands, "leave-printing": !server,
     "run-commands": !commanded, "held": over || commands, "words-line": !print.words.length, "run-log": !print.log, "forget": !over || !commands,
   });
-  if (!commanded) sure(false);
+  if (!commanded) $("sure").hidePopover();
   $("run-state").className = over ? state : "";
   $("pause").dataset.print = paused ? "resume" : "pause";
   $("run-log").href = `prints/${print.number}/log`;
@@ -93,13 +91,9 @@ export function showProgress(print) {
   }
 }
 
-/** What is told of a print of before, in this order. */
-export const pastCells = ({ name, outcome, seconds, filament_m: metres, begun }) => [
-  name, outcome, seconds == null ? "–" : roughly(seconds), metres == null ? "–" : `${metres.toFixed(1)} m`, moment(begun)];
-
 export function showHistory(prints = []) {
   hide({ "history-field": !prints.length });
-  putTable($("past-prints"), prints, ["print", "outcome", "time", "filament", "begun"], () => prints.map((print) => rowOf(pastCells(print))));
+  putTable($("past-prints"), prints, ["print", "outcome", "time", "filament", "begun"], () => prints.map(({ cells, begun }) => rowOf([...cells, moment(begun)])));
 }
 
 /** The bar at the foot is there on every tab while anything prints; it is of the print that is looked at, where that runs. */
@@ -137,9 +131,7 @@ export function notifyOver(prints, page) {
 
 /** A printer that is heated and moved from the page, with nothing printed. ask({does, ...}): what is to be done at it. */
 export function handPanel(ask) {
-  const sure = (whether) => hide({ "hand-sure": !whether });
-  listen("click", { "hand-home": () => sure(true), "hand-not": () => sure(false) });
-  onData("hand", ({ hand: does, keep }) => { sure(false); ask({ does, keep_heat: keep === "yes" }); }, $("hand-live"));
+  onData("hand", ({ hand: does, keep }) => ask({ does, keep_heat: keep === "yes" }), $("hand-live"));
   onData("jog", ({ jog: [axis, way] }) => ask({ does: "jog", axis, by_mm: Number(`${way}${$("hand-step").value}`) }), $("hand-live"));
 }
 
