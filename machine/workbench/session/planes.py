@@ -21,7 +21,6 @@ from mdp.search.trial import Obstacle, Trial
 from mdp.zone import Zones
 from profiles.effect import effect_of_change
 from profiles.errors import MeshError, PlanError
-from profiles.files import modified_s
 from profiles.frozen import Effect
 
 REST_S = 0.1  # pause in dragging after which the planes are tried more closely
@@ -78,7 +77,7 @@ def standing_of(session: SessionBase) -> Derived[Standing]:
 
     async def find(bench: Bench) -> Standing:
         drawn = session.new_file()
-        standing = await session.hand.run(stand, bench, session.others_of(bench), drawn)
+        standing = await session.hand.run(stand, bench, session.others, drawn)
         finalize(standing, drawn.unlink, missing_ok=True)
         if standing.refusal:
             session.refuse(MeshError(standing.refusal))
@@ -95,9 +94,8 @@ def _stands_by(session: SessionBase, bench: Bench) -> tuple[object, ...] | None:
     decides = process.self_supporting_angle_deg, process.line_width_mm, process.place_mm, bench.profile.machine
     several = bench.copies > 1 or bool(bench.beside)
     plate = (bench.copies, bench.beside, bench.cuts, bench.zones, bench.profile) if several else ()
-    others = session.others_of(bench) if bench.beside else None
-    cut_at_s = modified_s(others) if others is not None and others.exists() else 0.0
-    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides, plate, cut_at_s
+    others = session.others_version if bench.beside else 0
+    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides, plate, others
 
 
 def pedestal_key(bench: Bench, standing: Standing | None) -> str:
