@@ -25,6 +25,7 @@ from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Trial
+from profiles.errors import PlanError
 from profiles.messages import advice, option
 from profiles.profile import Profile, load
 from tests.machine.workbench.models import model
@@ -514,6 +515,53 @@ def test_prices_go_on_while_the_bench_changes_in_what_does_not_decide_them_and_a
     bench = when_done(work).bench
     assert (priced, bench.priced, bench.copies) == ([0, 1], True, 3)
     assert with_front(replace(bench, priced=False), rows).priced
+
+
+def reading_plates(session: Session) -> None:
+    """Have it read files of two plates, and measure no plan."""
+
+    async def read(task: Any, *given: Any, **more: Any) -> Any:
+        if task.__name__ != "read_model":
+            return ()
+        path, name, _, _, plate = given
+        return replace(model(name), path=path, plates={1: "", 2: ""}, plate=plate)
+
+    session.quick.run = read  # type: ignore[method-assign]
+
+
+def test_the_first_plate_of_a_file_can_be_added_instead_also_after_another_one_was_looked_at() -> None:
+    offered: list[str] = []
+
+    async def work(session: Session) -> None:
+        reading_plates(session)
+        await session.open_model(Path("b.3mf"), "b.3mf")
+        for plate in (2, 1):
+            await session.open_plate(plate=plate)
+            offered.append(session.addable)
+            if not session.addable:
+                with pytest.raises(PlanError, match=r"plate 2 of b\.3mf is open: only the first plate"):
+                    await session.add_opened()
+        await session.add_opened()
+
+    bench = when_done(work).bench
+    assert offered == ["", "b.3mf"]
+    assert bench.model is not None
+    assert (bench.model.name, [other.name for other, _ in bench.beside]) == ("a", ["b.3mf"])
+
+
+def test_a_demo_that_is_cut_by_its_plan_says_too_that_the_work_before_it_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+    async def work(session: Session) -> None:
+        reading_plates(session)
+        (tmp_path / "a.stl").write_bytes(b"solid")
+        session.do("copies", replace(session.bench, model=replace(model("a"), path=tmp_path / "a.stl"), copies=2))
+        await session.open_demo(name="demo:calibration")
+
+    session = when_done(work)
+    assert (session.bench.parts > 1, session.note) == (True, "a is kept under Earlier work (Undo brings it back)")
 
 
 @pytest.mark.parametrize(("task", "priced"), [("price_cuts", True), ("price_row", False)])
