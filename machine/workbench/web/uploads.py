@@ -21,7 +21,7 @@ from machine.workbench.session.keeping import OPEN_ELSEWHERE
 from machine.workbench.session.session import Session
 from machine.workbench.work.folders import Received, folders_kept, remove_file
 from profiles.errors import PlanError, ProfileError, reason
-from profiles.files import lock_folder, remove_locked
+from profiles.files import lock_folder, modified_s, remove_locked
 from profiles.messages import check_text, option
 from profiles.places import KINDS, kind_in
 
@@ -101,7 +101,8 @@ class Uploads:
             try:
                 project = read_folder(folder)
             except PlanError:
-                rows.append({"key": folder.name, "name": "", "parts": 0, "written_s": folder.stat().st_mtime})
+                with suppress(FileNotFoundError):  # another page has removed it meanwhile
+                    rows.append({"key": folder.name, "name": "", "parts": 0, "written_s": modified_s(folder)})
             else:
                 name = ", ".join(project.names)
                 rows.append({"key": folder.name, "name": name, "parts": project.parts, "written_s": project.written_s})
@@ -122,7 +123,9 @@ class Uploads:
     async def remove_kept(self, session: Session, request: Request) -> Response:
         """Remove a folder of kept work."""
         folder = _kept_folder(request)
-        lock = lock_folder(folder)
+        lock = None
+        with suppress(FileNotFoundError):
+            lock = lock_folder(folder)
         if lock is None:
             raise PlanError(OPEN_ELSEWHERE)
         await asyncio.to_thread(remove_locked, folder, lock)
