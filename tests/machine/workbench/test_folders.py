@@ -252,7 +252,7 @@ def test_earlier_work_that_was_opened_is_there_as_it_was_after_undo(
 
     async def open_and_undo() -> int:
         session = Session(load(), Given(), WorkerPools())
-        session._read = read  # type: ignore[method-assign, assignment]
+        session._read = read  # type: ignore[method-assign]
         if before.startswith("demo:"):
             await session.open_demo(name=before)
         elif before:
