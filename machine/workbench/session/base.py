@@ -70,10 +70,10 @@ class SessionBase(Observable):
     executed at a time, and nothing else changes the bench meanwhile.
 
     problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
-    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; note: what the
-    last command has changed beside what it was for; quick, long, hand: its tasks in the pools; received: the files of its pages;
-    others: file of the parts of the other models on the plate (see work.plate); others_version: how often a task has added some;
-    followers: called after every change of the bench.
+    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; note: what the last
+    command has changed beside what it was for; quick, long, hand: its tasks in the pools; aside: tasks for which nobody waits;
+    received: the files of its pages; others: file of the parts of the other models on the plate (see work.plate); others_version:
+    how often a task has added some; followers: called after every change of the bench.
     """
 
     def __init__(self, bench: Bench, pools: WorkerPools) -> None:
@@ -83,6 +83,7 @@ class SessionBase(Observable):
         self.answers: dict[str, str] = {}
         self.busy = self.note = ""
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
+        self.aside = TaskQueue(pools.quick)
         self.followers: list[Callable[[], None]] = []
         self.turn = asyncio.Lock()  # fair: first come, first served
         self.received = Received()

@@ -97,7 +97,7 @@ class Session(SessionBase):
         self.closed = True
         for task in self._tasks:
             task.cancel()
-        for tasks in (self.quick, self.long, self.hand):
+        for tasks in (self.quick, self.long, self.hand, self.aside):
             tasks.close()
         self.notify()
         trouble = await self.keeping.finish()
