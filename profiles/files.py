@@ -96,7 +96,7 @@ def keep_newest(
     """
     dates = dict[Path, Any]()
     for path in paths:
-        with suppress(FileNotFoundError):  # somebody else has deleted it
+        with suppress(FileNotFoundError):  # another process has deleted it
             dates[path] = when(path)
     newest = sorted(dates, key=dates.__getitem__, reverse=True)
     kept = [*newest[:count], *(path for path in newest[count:] if in_use(path))]
