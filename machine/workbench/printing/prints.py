@@ -206,7 +206,7 @@ def _same(a: Destination, b: Destination) -> bool:
 
 
 def past_row(past: dict[str, Any]) -> dict[str, Any]:
-    """Name, outcome, time and filament of a past print as texts, and when it began, which the browser shows in its own time zone."""
+    """Name, outcome, time and filament of a past print as texts, and its start, which a browser shows in its own time zone."""
     seconds, metres = past["seconds"], past["filament_m"]
     time, filament = "–" if seconds is None else about(seconds), "–" if metres is None else f"{metres:.1f} m"
     return {"cells": [past["name"], past["outcome"], time, filament], "begun": past["begun"]}

@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import count
-from math import hypot, inf
+from math import acos, degrees, hypot, inf
 from typing import Any
 from weakref import finalize
 
@@ -21,9 +21,9 @@ from mdp.search.trial import Obstacle, Trial
 from mdp.zone import Zones
 from profiles.effect import effect_of_change
 from profiles.errors import MeshError, PlanError
-from profiles.files import modified_s
 from profiles.frozen import Effect
 
+ALIKE_MM, ALIKE_DEG = 0.01, 0.05  # differences between planes that are not reported
 REST_S = 0.1  # pause in dragging after which the planes are tried more closely
 CHANGING_S = 0.2  # pause in changes of a bench after which it is prepared
 _numbers = count(1)  # of the benches of all sessions, which may share processes
@@ -78,7 +78,7 @@ def standing_of(session: SessionBase) -> Derived[Standing]:
 
     async def find(bench: Bench) -> Standing:
         drawn = session.new_file()
-        standing = await session.hand.run(stand, bench, session.others_of(bench), drawn)
+        standing = await session.hand.run(stand, bench, session.others, drawn)
         finalize(standing, drawn.unlink, missing_ok=True)
         if standing.refusal:
             session.refuse(MeshError(standing.refusal))
@@ -95,9 +95,8 @@ def _stands_by(session: SessionBase, bench: Bench) -> tuple[object, ...] | None:
     decides = process.self_supporting_angle_deg, process.line_width_mm, process.place_mm, bench.profile.machine
     several = bench.copies > 1 or bool(bench.beside)
     plate = (bench.copies, bench.beside, bench.cuts, bench.zones, bench.profile) if several else ()
-    others = session.others_of(bench) if bench.beside else None
-    cut_at_s = modified_s(others) if others is not None and others.exists() else 0.0
-    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides, plate, cut_at_s
+    others = session.others_version if bench.beside else 0
+    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides, plate, others
 
 
 def pedestal_key(bench: Bench, standing: Standing | None) -> str:
@@ -167,6 +166,9 @@ class PlaneTrials:
             raise PlanError(f"{edit.reason}part {trial.rejected_part} cannot be cut off: {trial.rejected}{nowhere}")
         self.trial = bench, cuts, trial
         self._session.do(edit.word, with_cuts(bench, cuts))
+        (wanted, number), moved = edit.orders[0], [plane for plane in cuts if plane not in edit.cuts]
+        if moved:
+            self._session.add_note(_moved_in_words(wanted[number - 2], moved[0]))
 
     async def take_neck(self, part: int) -> None:
         """Move the plane of a part to the neck near it. Raises PlanError if there is none, or it cannot be cut."""
@@ -250,3 +252,16 @@ def removed_in_words(removed: Mapping[int, str]) -> str:
     """Which cuts were removed and why, as a sentence; "" for none. removed: reasons by the numbers of their parts."""
     sentences = "; ".join(f"the cut of part {part} was removed: {reason}" for part, reason in removed.items())
     return sentences and f"{sentences} (Undo brings {'it' if len(removed) == 1 else 'them'} back)"
+
+
+def _moved_in_words(wanted: PlannedPart, there: PlannedPart) -> str:
+    """How far from its wanted position a plane has been placed; "" for too small a distance."""
+    assert wanted.plane is not None
+    assert there.plane is not None
+    leans_deg = degrees(acos(min(float(wanted.plane.normal @ there.plane.normal), 1.0)))
+    up_mm = there.plane.offset_mm - wanted.plane.offset_mm
+    if leans_deg > ALIKE_DEG:
+        return f"The plane leans by {leans_deg:.0f}°: nowhere along its own direction can it be cut."
+    side = "above" if up_mm > 0.0 else "below"
+    nearest_place = f"The plane stands {abs(up_mm):.2f} mm {side} the wanted position, at the nearest one that can be cut."
+    return nearest_place if abs(up_mm) >= ALIKE_MM else ""

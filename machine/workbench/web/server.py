@@ -268,6 +268,7 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("left/{number:int}", uploads.open_left, "POST"),
         route("left/{number:int}", uploads.remove_left, "DELETE"),
         route("kept", uploads.list_kept),
+        route("kept/{name}/picture", uploads.kept_picture),
         route("kept/{name}", uploads.open_kept, "POST"),
         route("kept/{name}", uploads.remove_kept, "DELETE"),
         route("project.3mf", _made_file("saving the project", make_project, "model/3mf", ".3mf"), need=Need.MODEL),

@@ -35,7 +35,7 @@ from machine.simulator.simulator import SimulatedPrinter
 from machine.workbench.printing import running_print
 from machine.workbench.printing.at_page import BEGIN, LEAVE, AtPage, JobState, Slices
 from machine.workbench.printing.commands import COMMANDS, PageOfPrints, obey
-from machine.workbench.printing.prints import Prints
+from machine.workbench.printing.prints import Prints, past_row
 from machine.workbench.printing.process import carry_out
 from machine.workbench.printing.running_print import RunningPrint
 from mdp.kernels.workers import frame, listen
@@ -591,3 +591,9 @@ def test_what_runs_stays_in_the_list_to_be_stopped_and_of_what_is_over_the_newes
         assert [listed.number for listed in prints.prints if listed.over] == [11, 12, 13, 14, 15]
 
     asyncio.run(run())
+
+
+def test_a_past_print_goes_to_pages_as_texts_with_dashes_for_what_is_unknown() -> None:
+    done = {"name": "box", "outcome": "done", "begun": 7.0, "seconds": 5400.0, "filament_m": 1.25}
+    assert past_row(done) == {"cells": ["box", "done", "1h 30m", "1.2 m"], "begun": 7.0}
+    assert past_row({**done, "seconds": None, "filament_m": None})["cells"] == ["box", "done", "–", "–"]

@@ -102,7 +102,8 @@ export async function offer(what) {
 function offerRow(what, { key, name = "", bytes, parts, written_s: written }) {
   const act = (method) => () => fetch(`${what}/${key}`, { method }).then(() => offer(what), () => {});
   const title = name || "cannot be read here", size = bytes ? `${Math.ceil(bytes / 1000).toLocaleString("en")} kB` : parts ? partsInWords(parts) : "uncut", words = `${size}, ${moment(written)}`;
-  return made("li", {}, button("", act("POST"), {}, made("span", { text: title }), made("small", { text: words })), removeButton(`Remove ${title}, ${words}`, act("DELETE")));
+  const picture = what === "kept" ? made("img", { alt: "", loading: "lazy", src: `kept/${key}/picture` }) : "", open = button("", act("POST"), {}, picture, made("span", { text: title }), made("small", { text: words }));
+  return made("li", {}, open, removeButton(`Remove ${title}, ${words}`, act("DELETE")));
 }
 
 /** On this computer's page, where the workbench is open to the network: which devices are paired, each with a button that lets it go. */

@@ -1,6 +1,6 @@
 // Print shown: a print's checks, its progress and its end, the bar on every tab, what is told outside the page, and its printer: by hand, by its camera, in a graph.
 
-import { $, clock, duration, hide, listen, listIn, moment, onData, optionsOf, putNew, putTable, rowOf, tell, tellIn } from "../../../../view/template/elements.js";
+import { $, clock, duration, hide, listIn, moment, onData, optionsOf, putNew, putTable, rowOf, tell, tellIn } from "../../../../view/template/elements.js";
 import { keptInTab } from "../store.js";
 
 const SILENT_MS = 5000; // a print that goes on is told five times a second
