@@ -79,8 +79,7 @@ export function themeSwitch(changed) {
 
 const NOTICES = new Map(); // what is said now, by what it is about
 
-/** Says something over the picture, or ("") says it no more; shown is what began to be said last.
- * What one thing says stays until the same thing takes it back: a picture that is ready does not wipe away a warning. */
+/** Show a notice over the picture until its own source clears it by ""; the latest one is visible. */
 export function notice(text, about) {
   if (NOTICES.get(about) !== text) NOTICES.delete(about); // what is said anew goes to the end
   if (text) NOTICES.set(about, text);
@@ -89,8 +88,7 @@ export function notice(text, about) {
 
 const UNTYPED = ["range", "radio", "checkbox", "button", "file"]; // inputs into which no letter goes
 
-/** Whether the element in focus needs a key itself, so that it is no command: a field that is typed into, a list, which goes to the entry
- * of a letter, a slider, a button. */
+/** Whether the focused element uses a key itself, so that the key is no command: a text field, a list, a slider, a button. */
 export function needsKey({ key, target: { tagName, type } }) {
   if (["SELECT", "TEXTAREA"].includes(tagName) || (tagName === "INPUT" && !UNTYPED.includes(type))) return true;
   if (tagName === "INPUT" && ["range", "radio"].includes(type) && /^(Arrow|Page|Home|End)/.test(key)) return true;
@@ -134,6 +132,19 @@ export function putAt(element, place) {
 /** Colours with words, so many that they have room. */
 export const swatches = (entries) => entries.slice(0, 24).map(([colour, text]) => made("span", {}, swatch(colour), text));
 
+/** Arrow keys, {key: step}, move the focus around a row or a column of elements; reached(element) is called before. */
+export function moveFocus(container, selector, steps, reached = () => {}) {
+  container.addEventListener("keydown", (event) => {
+    const all = [...container.querySelectorAll(selector)], step = steps[event.key];
+    if (!step) return;
+    const next = all[(all.indexOf(document.activeElement) + step + all.length) % all.length];
+    reached(next);
+    next.focus();
+    event.preventDefault();
+    event.stopPropagation();
+  });
+}
+
 /** chosen(panel's id) is called with every choice. */
 export function tabsOf(chosen) {
   const all = [...document.querySelectorAll("[role=tab]")];
@@ -145,17 +156,8 @@ export function tabsOf(chosen) {
     });
     chosen(tab.getAttribute("aria-controls"));
   };
-  all.forEach((tab, k) => {
-    tab.addEventListener("click", () => choose(tab));
-    tab.addEventListener("keydown", (event) => {
-      const step = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-      if (!step) return;
-      const next = all[(k + step + all.length) % all.length];
-      choose(next);
-      next.focus();
-      event.stopPropagation();
-    });
-  });
+  all.forEach((tab) => tab.addEventListener("click", () => choose(tab)));
+  moveFocus($("tabs"), "[role=tab]", { ArrowRight: 1, ArrowLeft: -1 }, choose);
 }
 
 /** What single keys do, where no element needs them itself; closed(): they do nothing now. */
@@ -183,13 +185,13 @@ export const fill = (field, value, anew = false) => { if (anew || document.activ
 /** A button of a row that takes away what it stands for. */
 export const removeButton = (words, onclick) => button("×", onclick, { title: words, ariaLabel: words });
 
-/** Children of an element, made() where what they tell is new; a choice or a switch that had the keyboard has it again. */
-export function putNew(element, told, made) {
-  const fresh = JSON.stringify(told), held = document.activeElement;
+/** Replace the children of an element by children() where their content has changed; a focused radio button or checkbox gets the focus again. */
+export function putNew(element, content, children) {
+  const fresh = JSON.stringify(content), held = document.activeElement;
   if (element.dataset.shown === fresh) return;
   element.dataset.shown = fresh;
   const name = held && element.contains(held) ? held.name : "";
-  element.replaceChildren(...made());
+  element.replaceChildren(...children());
   if (name) (element.querySelector(`[name="${name}"]:checked`) || element.querySelector(`[name="${name}"]`))?.focus();
 }
 
@@ -198,16 +200,15 @@ export const tellIn = (id, pairs) => putNew($(id), pairs, () => termsOf(pairs));
 
 export const listIn = (id, sentences) => putNew($(id), sentences, () => sentences.map((text) => made("li", { text })));
 
-/** Rows {id, told, make()} put into a list: those that tell the same as before stay, so that the keyboard keeps its place, and so
- * do those that a person types in. */
+/** Put rows {id, content, make()} into a list. Rows with the same content stay, so that the focus does, and so do rows in which the user types. */
 export function putRows(rows, into) {
   const here = [...into.children], same = here.length === rows.length && rows.every(({ id }, k) => here[k].dataset.id === id);
   const known = new Map(here.map((element) => [element.dataset.id, element])), held = document.activeElement?.closest("[data-id]")?.dataset.id;
-  const elements = rows.map(({ id, told, make }) => {
+  const elements = rows.map(({ id, content, make }) => {
     const old = known.get(id);
-    if (old && (old.dataset.told === told || old.dataset.typing)) return old;
+    if (old && (old.dataset.content === content || old.dataset.typing)) return old;
     const element = make();
-    Object.assign(element.dataset, { id, told });
+    Object.assign(element.dataset, { id, content });
     if (same) old.replaceWith(element);
     return element;
   });
@@ -218,8 +219,8 @@ export function putRows(rows, into) {
 /** A sentence whose options are not broken at their hyphens. */
 export const withWholeOptions = (text) => text.split(/(?<=\s)(--[\w-]+)/).map((piece, k) => (k % 2 ? made("span", { text: piece, className: "option" }) : piece));
 
-/** A table's head and rows(), where what they tell has changed. */
-export const putTable = (table, told, head, rows) => putNew(table, told, () => {
+/** Replace head and rows() of a table where their content has changed. */
+export const putTable = (table, content, head, rows) => putNew(table, content, () => {
   const body = rows(), titles = made("tr", {}, ...head.map((text) => (text ? made("th", { text, scope: "col" }) : made("td"))));
   return body.length ? [...(head.length ? [made("thead", {}, titles)] : []), made("tbody", {}, ...body)] : [];
 });

@@ -29,6 +29,7 @@ from mdp.save import plane_values
 from mdp.search.plan_file import ZONE_KINDS
 from mdp.search.trial import Trial
 from mdp.zone import AnyZone, Brushed, MeshVolume, Modifier, Zone
+from profiles.machine import Table
 from profiles.material import Material
 from profiles.messages import advice, option, settings_in, terminal_words
 from profiles.places import OF_KIND
@@ -242,6 +243,7 @@ def _plate_state(session: Session) -> dict[str, Any]:
         "copies": bench.copies,
         "copies_mm": standing and [[round(x, 3), round(y, 3)] for x, y in standing.copies_mm],
         "copies_told": told,
+        "plate_told": _extent(bench.profile.machine.table),
         "beside": [{"name": other.name, "copies": copies} for other, copies in bench.beside],
         "others": standing and standing.others_key,
         "addable": session.addable,
@@ -291,6 +293,12 @@ def _stop(stop: Stop) -> dict[str, str]:
     """A pause in words."""
     where = f"at {stop.height_mm or 0.0:.12g} mm" if stop.layer is None else f"before layer {stop.layer}"
     return {"kind": "filament change" if stop.change else "pause", "where": f"part {stop.part}, {where}"}
+
+
+def _extent(table: Table) -> str:
+    """Sentence with the extent of the build plate."""
+    x_mm, y_mm = (size / 2.0 for size in table.size_mm or (2.0 * table.radius_mm,) * 2)
+    return f"The plate goes from −{x_mm:g} to {x_mm:g} mm along x, from −{y_mm:g} to {y_mm:g} mm along y."
 
 
 def marks_key(bench: Bench) -> str:

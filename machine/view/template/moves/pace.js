@@ -1,6 +1,5 @@
-// Pace: a picture only after a change; where the whole takes long, a coarse one at once and the whole piece by piece when all rests.
-// The coarse one has far fewer beads, for the eye while it moves: of what is seen from outside every k-th layer, as high as k of them, and
-// straight pieces instead of fine curves. Where the file does not tell what is seen from outside, of all kinds of line.
+// Pace: a picture is drawn after a change. A slow one is drawn coarse at once, and whole in pieces when nothing moves.
+// The coarse one has every k-th layer, as high as k layers, of the lines visible from outside (of all, if the file does not name them), without fine curves.
 
 import { notice } from "../elements.js";
 import { clamp, countUpTo } from "../picture/math.js";
@@ -12,8 +11,7 @@ const TOPS = /top|ironing/i; // they close the model whatever layer they lie in
 const BEND_MM = 0.04; // by which a coarse bead may leave the path, a layer
 const AT_MOST = 12; // rows in one bead
 
-/** A path as beadsOf draws it, {slots, texels, points, sizes, verticals}, and of each slot the rows that it stands for, from first to
- * last: the last ones rise. Slots of no size lie between strokes. */
+/** A path for beadsOf {slots, texels, points, sizes, verticals}, with the first and last row of each slot, in rising order. Slots without a size lie between strokes. */
 export function coarseOf(rows, path, k) {
   const kept = keptRows(rows, k), bend = (k * BEND_MM) ** 2, points = [], first = [], last = [];
   let slot = -1;
@@ -91,8 +89,7 @@ export function coarseColours(coarse, path, colours) {
   return new Uint8Array(own.buffer);
 }
 
-/** What of ranges of rows is drawn coarse and what fine, as ranges of slots: the layer that the slider has reached, and those after
- * the last coarse one, are drawn as they are. */
+/** Ranges of slots that are drawn coarse and fine for ranges of rows: the slider's layer, and those after the last coarse one, are fine. */
 export function dividedRanges({ rows, path }, coarse, ranges) {
   const rough = [], fine = [];
   for (const range of ranges) {

@@ -1,5 +1,4 @@
-// Rows: the page's own bytes (docs/page-format.md), the moves of the print in them, one row a straight move, and all that is worked out
-// of them once, when the page is opened.
+// Rows: the moves of the print from the page's data (docs/page-format.md), one row for each straight move, and what is computed from them at the start.
 
 import { bounds, countUpTo, IDENTITY, length, mix, moved, multiply, RAD, rotated, sub, undone, unit } from "../picture/math.js";
 import { surfacesOf } from "../picture/shapes.js";
@@ -110,8 +109,7 @@ export function placeAt(rows, row, share) {
   });
 }
 
-/** The path on the workpiece for drawing: slots, one a row, and an empty one before every row that begins elsewhere than the
- * row before has ended. Slot s goes from points[s] to points[s + 1]; slot(row) tells a row's. */
+/** The path on the workpiece for drawing: a slot for each row, and an empty one before a row that begins away from the end of the last. Slot s goes from points[s] to points[s + 1]; slot(row) is a row's. */
 function pathOf(rows, chain) {
   const jumps = rows.jumpRow.filter((row) => row > 0), slots = rows.count + jumps.length;
   const texels = Math.max(Math.ceil((slots + 2) / TEXELS), 1) * TEXELS; // whole lines of a texture

@@ -1,6 +1,6 @@
 // Controls: what is coloured how, what is shown and what is not; the legend; dark and light.
 
-import { $, duration, listen, made, numberIn, optionsOf, partsInWords, swatch, swatches, tabsOf, toggle } from "../elements.js";
+import { $, duration, listen, made, numberIn, optionsOf, partsInWords, swatch, swatches, tabsOf, tell, toggle } from "../elements.js";
 import { RAMP, typeColour } from "../moves/colours.js";
 import { KIND } from "../moves/rows.js";
 import { mix } from "../picture/math.js";
@@ -71,28 +71,23 @@ function kindEntries(rows) {
 
 const KINDS = ["travel", "", "retraction", "turning the table", "wipe", "prime"];
 
-/** Where the print is after the row shown, in the file's own numbers. */
+/** Position and values of the print after the row that is shown, as in the file. */
 export function readoutsOf(print, scene, bells) {
-  const { rows, header, flow } = print, letters = [header.machine.tilt.letter, header.machine.turn.letter];
+  const { rows, header, flow } = print;
   const axis = (k, digits) => () => scene.place[k].toFixed(digits);
   const pushed = () => mix(scene.row ? rows.filament[scene.row - 1] : 0, rows.filament[scene.row], scene.share) * 1e-5;
-  const told = [
-    ["line", "line", (i) => rows.line[i]], ["time", "time", () => duration(scene.time())],
-    ["x", "X", axis(0, 3)], ["y", "Y", axis(1, 3)], ["z", "Z", axis(2, 3)], ["e", "E", () => pushed().toFixed(3)],
-    ["tilt", letters[0], axis(3, 3)], ["turn", letters[1], axis(4, 3)],
-    ["part", "part", (i) => rows.part[i] || "–"], ["layer", "layer", (i) => rows.layer[i] || "–"],
-    ["type", "doing", (i) => KINDS[rows.kind[i]] || rows.types[rows.type[i]] || "extruding"],
-    ["speed", "speed", (i) => `${(rows.speed[i] / 1000).toFixed(1)} ${rows.kind[i] === KIND.rotate ? "°/s" : "mm/s"}`],
-    ["size", "bead", (i) => (rows.width[i] ? [rows.width[i], rows.height[i]].map((x) => (x / 1000).toFixed(2)).join(" × ") : "–")],
-    ["flow", "flow", (i) => (flow(i) ? `${flow(i).toFixed(2)} mm³/s` : "–")],
-    ["fan", "fan", (i) => `${Math.round(rows.fan[i] / 2.55)} %`],
-    ["nozzle", "nozzle", (i) => (rows.nozzle[i] ? `${(rows.nozzle[i] / 10).toFixed(0)} °C` : "–")],
-    ["bed", "bed", (i) => (rows.bed[i] ? `${(rows.bed[i] / 10).toFixed(0)} °C` : "–")],
-  ];
-  const less = ["fan", "flow", "nozzle", "bed", "size"];
-  for (const [id, label] of told) {
-    const className = less.includes(id) ? "less" : id === "type" ? "wide" : "";
-    $("readouts").append(made("dt", { text: label, className: less.includes(id) ? "less" : "" }), made("dd", { className }, made("output", { id: `readout-${id}`, ariaLive: "off" })));
-  }
-  bells.on("row", () => { for (const [id, , of] of told) $(`readout-${id}`).textContent = rows.count ? of(scene.row) : "–"; });
+  const texts = {
+    line: (i) => rows.line[i], time: () => duration(scene.time()),
+    x: axis(0, 3), y: axis(1, 3), z: axis(2, 3), e: () => pushed().toFixed(3), tilt: axis(3, 3), turn: axis(4, 3),
+    part: (i) => rows.part[i] || "–", layer: (i) => rows.layer[i] || "–",
+    type: (i) => KINDS[rows.kind[i]] || rows.types[rows.type[i]] || "extruding",
+    speed: (i) => `${(rows.speed[i] / 1000).toFixed(1)} ${rows.kind[i] === KIND.rotate ? "°/s" : "mm/s"}`,
+    size: (i) => (rows.width[i] ? [rows.width[i], rows.height[i]].map((x) => (x / 1000).toFixed(2)).join(" × ") : "–"),
+    flow: (i) => (flow(i) ? `${flow(i).toFixed(2)} mm³/s` : "–"),
+    fan: (i) => `${Math.round(rows.fan[i] / 2.55)} %`,
+    nozzle: (i) => (rows.nozzle[i] ? `${(rows.nozzle[i] / 10).toFixed(0)} °C` : "–"),
+    bed: (i) => (rows.bed[i] ? `${(rows.bed[i] / 10).toFixed(0)} °C` : "–"),
+  };
+  tell({ "letter-tilt": header.machine.tilt.letter, "letter-turn": header.machine.turn.letter });
+  bells.on("row", () => { for (const [id, text] of Object.entries(texts)) $(`readout-${id}`).textContent = rows.count ? text(scene.row) : "–"; });
 }

@@ -2,8 +2,7 @@
 
 import { $, hide, listen, onData, tell, toggle } from "../elements.js";
 
-/** The workbench says {tiltprint: "finding", finding}, {..: "line", line}, {..: "text", text: the file}, {..: "theme", dark}, {..: "view", yaw, pitch in
- * radians}; it is told the latter, too, when a hand has turned the view. */
+/** Messages of the workbench: {tiltprint: "finding", finding}, {..: "line", line}, {..: "text", text: a file}, {..: "theme", dark}, {..: "view", yaw, pitch in radians}; the last one is sent back when the view turns. */
 export function outsideOf({ scene, findings, code, chooseTheme, camera, bells }) {
   if (parent === window || location.origin === "null") return;
   toggle("inside", true);

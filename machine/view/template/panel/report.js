@@ -1,6 +1,6 @@
 // Report: the front of decompositions, figures and tables beside the picture, findings in a list and over it, and the picture that is printed.
 
-import { $, button, findingButton, hide, listen, made, putAt, rowOf, termsOf } from "../elements.js";
+import { $, button, findingButton, hide, listen, made, putAt, putTable, rowOf, termsOf } from "../elements.js";
 import { standing } from "../moves/picture.js";
 import { carried, projected } from "../picture/math.js";
 import { MOST_CUTS } from "../picture/shapes.js";
@@ -15,8 +15,8 @@ export function frontOf(print, scene) {
     scene.tryRow(row.chosen || !drawable ? null : row);
     showChoice(row, drawable);
   };
-  const head = made("tr", {}, ...["parts", ...front[0].figures.map(([name, , unit]) => `${name} ${unit}`)].map((text) => made("th", { text, scope: "col" })));
-  $("front").append(made("thead", {}, head), made("tbody", {}, ...front.map((row, k) => lineOf(row, !row.chosen && !pays(row, front.slice(0, k)), choose))));
+  const head = ["parts", ...front[0].figures.map(([name, , unit]) => `${name} ${unit}`)];
+  putTable($("front"), front, head, () => front.map((row, k) => lineOf(row, !row.chosen && !pays(row, front.slice(0, k)), choose)));
   showChoice(front.find((row) => row.chosen) || null);
 }
 

@@ -83,8 +83,7 @@ export function placeOn(canvas, { clientX, clientY }) {
   return [((clientX - left) / width * 2 - 1) * (width / height), 1 - ((clientY - top) / height) * 2];
 }
 
-/** Hands on the canvas: one finger or button turns, the other button or two fingers shift, wheel and pinch zoom; pressed(event), asked(event): a click, with the other button. take(event): what the first
- * finger takes hold of instead, {move(event), put(), drop()}, null: nothing; a second finger drops it. */
+/** Pointers on the canvas: one turns, the right button or two fingers shift, wheel and pinch zoom. pressed(event), asked(event): a click, a right click; take(event): a drag that replaces turning, {move(event), put(), drop()} or null. */
 export function handle(canvas, camera, { changed, pressed, asked = () => {}, take = () => null }) {
   const fingers = new Map();
   let path = 0, held = null;

@@ -65,8 +65,7 @@ function settersOf(gl, program) {
   }));
 }
 
-/** Corners on the card, {draw(values of uniforms, calls()), put(name, content), free}. attributes: by name [content, numbers a corner],
- * bytes are shares of 255; indices: of the corners, where triangles name them. */
+/** Vertices on the card {draw(uniforms, calls()), put(name, content), free}. attributes: {name: [content, numbers for each vertex]}, bytes are shares of 255; indices: of the vertices of the triangles. */
 export function cornersOn(gl, program, attributes, indices = null) {
   const array = gl.createVertexArray(), buffers = {};
   const filled = (target, content) => {

@@ -1,5 +1,4 @@
-// Shapes: triangles and lines of the machine's bodies, of the parts' surfaces, the planes of the cuts and the directions of printing; and their
-// drawing: triangles with flat faces, whole or as a ghost whose edges show and whose faces let the light through, and lines.
+// Shapes: triangles and lines of machine, parts, cut planes and directions, and their drawing, solid or as a transparent ghost.
 
 import { $, disable, numberIn, tell } from "../elements.js";
 import { cornersOn, LIGHT, programOf } from "./gl.js";
@@ -75,8 +74,7 @@ export function clipOf(toEye, plane) {
   return { clip: plane ? [...normal, plane.offset_mm + dot(normal, toEye.slice(12, 15))] : UNCUT };
 }
 
-/** Drawing for triangles {places, colours}, three corners each; a range of corners may be drawn alone; lift: in depth, towards the eye;
- * clip: a plane of the eye's frame that cuts a closed solid (capped) or what is open. */
+/** Drawing for triangles {places, colours}, or a range of their corners. lift: in depth, towards the eye; clip: a plane of the eye's frame that cuts a closed (capped) or an open surface. */
 export function solidOf(gl, { places, colours }, mode = gl.TRIANGLES) {
   const shape = cornersOn(gl, programOf(gl, SOLID_VERTEX, SOLID_FRAGMENT), { place: [places, 3], colour: [colours, 4] }), corners = places.length / 3;
   const draw = ({ toClip, toEye }, { ghost = 0, strength = 1, lift = 0, cuts = null, clip = UNCUT, capped = false, range: [first, end] = [0, corners] } = {}) => {
@@ -259,8 +257,7 @@ export const ownInk = ({ part }) => {
   return () => word;
 };
 
-/** The plane {normal, offset_mm} above which nothing is drawn, as the controls of both pages have it: across an axis of a box or as a cut, from whose middle the
- * slider shifts it by percents of half the box; null: none. */
+/** The plane {normal, offset_mm} above which nothing is drawn, from the controls of both pages: across an axis of a box, or a cut; the slider shifts it by percents of half the box. null: none. */
 export function sectionAsked(box, cut = null) {
   const along = $("section-along").value, { normal, offset_mm: through } = along === "cut" && cut ? cut : { normal: [0, 1, 2].map((k) => Number("xyz"[k] === along)) };
   const heights = cornersOf(box).map((corner) => dot(normal, corner)), low = Math.min(...heights), high = Math.max(...heights), side = $("section-flip").checked ? -1 : 1;

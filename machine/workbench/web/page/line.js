@@ -1,4 +1,4 @@
-// Lines: all that the page and its server say to each other: state in, commands out; when one is lost the page says so and tries again.
+// Connections to the server: states arrive, commands go out. A lost one is reported, and opened again.
 // A command is {do: NAME, its fields}; tests/machine/workbench/test_page_commands.py holds every one of the page against the server's:
 // send and ask: the bench's, FUNCTIONS in machine/workbench/session/commands.py; the state that answers: web/snapshot.py;
 // printsLine: the prints', COMMANDS in machine/workbench/printing/commands.py; the state: prints.snapshot() there;
@@ -11,7 +11,7 @@ export const AGAIN_MS = 1000;
 const SILENT_MS = 1500, LATE_MS = 200; // without a beat, two a second; and until what has come is heard, where the page itself was busy
 const ENDINGS = { 4404: "closed", 4403: "unpaired" }; // by the code with which the server ends a line: its bench is closed, its device let go
 const NOT_SENT = "the line to tiltprint is lost, so this was not done";
-export const LINE_TOLD = {
+export const LINE_STATUS = {
   open: "",
   lost: "The line to tiltprint is lost; trying again.",
   silent: "tiltprint does not answer; waiting for it.",
@@ -21,8 +21,7 @@ export const LINE_TOLD = {
   closed: "This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.",
 };
 
-/** A websocket below the page's address that comes back by itself: heard(what is told), and stands(a word of LINE_TOLD) whenever that changes.
- * Where its path asks for beats it stands as silent as long as none come. */
+/** A websocket below the page's address that reconnects by itself. heard(message); stands(a key of LINE_STATUS) at every change, "silent" while a path with beats receives none. */
 export function lineAt(path, heard, stands) {
   let socket = null, silence = 0, silent = false;
   const listening = () => {
@@ -60,15 +59,15 @@ kept.keep({ name: "" });
 addEventListener("pagehide", () => kept.keep({ name: OWN_PAGE }));
 
 /** A state as this page tells it: what others were refused is theirs to see. */
-function toldHere(state) {
+function ownState(state) {
   const own = (told) => ([OWN_PAGE, ""].includes(told?.page) ? told : null);
   return { ...state, problem: state.problems[OWN_PAGE] || state.problems[""] || "", refused: own(state.refused), units: own(state.units) };
 }
 
-/** The page's line to its bench: follow(state) is called with every new state, stands(how) with a word of LINE_TOLD. */
+/** The page's line to its bench: follow(state) is called with every new state, stands(how) with a word of LINE_STATUS. */
 export function openLine(follow, stands) {
   const heard = (state) => {
-    follow(toldHere(state));
+    follow(ownState(state));
     for (const [name, refusal] of Object.entries(state.answers)) {
       const answered = asked.get(name);
       asked.delete(name);
@@ -89,8 +88,7 @@ export function ask(command, answered) {
   send({ ...command, ask: name });
 }
 
-/** A function of a key and its address that gives take() what is there, read: only what was asked for last, and once; null: nothing.
- * insists: what is not there is asked for again, as it always is where the line is lost; begin(): something is asked for. */
+/** A function of a key and its address that passes what it fetches to take(), the latest request only; null for nothing. insists: retry what is missing, as after a lost connection; begin(): called before a request. */
 export function newest({ read, take, insists = false, begin = () => {} }) {
   let asked = "";
   return async (key, address) => {
@@ -117,9 +115,7 @@ export async function save(address) {
 export const ANSWER_MS = 3000; // within which the workbench answers, and a printer has confirmed an emergency stop
 const OWED_MS = 10000; // so long an emergency stop waits for a line: after that its person has done something else
 
-/** State in, commands out; the page's name goes with it, so that a line that comes back commands what it has commanded. An emergency
- * stop that finds no line is sent as soon as there is one, if that is soon and its print still there, else expired() is called; a command
- * to which nothing answers is told. */
+/** The connection to the prints. The page's name keeps its control of them after a reconnection. An emergency stop without a connection is sent once there is one, if that is soon and its print still exists, else expired() is called. */
 export function printsLine(follow, refused, expired) {
   let owed = [], waiting = 0;
   const sendOwed = (prints) => {

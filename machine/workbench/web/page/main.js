@@ -2,7 +2,7 @@
 
 import { $, button, duration, hide, listen, made, notice, onData, onKeys, putNew, tabsOf, tell, themeSwitch, toggle, withWholeOptions } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
-import { ask, LINE_TOLD, openLine, send } from "./line.js";
+import { ask, LINE_STATUS, openLine, send } from "./line.js";
 import { benchesPanel, devicesPanel, platePanel } from "./model/benches.js";
 import { modelPanel, placePanel, sizePanel } from "./model/model-panel.js";
 import { bodiesOf, facetsOf, modelFetcher, modelOf, thumbnailsOf } from "./model/model.js";
@@ -31,7 +31,7 @@ function main() {
   };
   openLine(follow, (how) => {
     root.dataset.line = how;
-    notice(LINE_TOLD[how], "line");
+    notice(LINE_STATUS[how], "line");
     update({ line: how });
   });
   tabsOf((tab) => update({ tab }));

@@ -1,9 +1,8 @@
-// Store: all that the page knows and shows, and the one way in which that changes. Whoever shows some of it subscribes.
+// Store: the state of the page, changed by update() alone. A panel subscribes to what it shows.
 
-/** state: as the server tells it; line: how the line to it stands, a word of LINE_TOLD; tab: what is looked at; triangles: of the model, null: none is drawn; turning: rows of the rotation under
- * a hand; placing: x, y of the model's middle on the plate under a hand; seen: {size_mm} of the triangles as they are drawn; clicks: what the next one on the model is for: "", "lay", "snap", "limb", "brush", "faces", "box", "measure"; part: the chosen one, 0: none; facets: on which the model rests, and which is lit; figures: of the
- * planes on the bench, as last known; hand: a plane under a hand, see planes.js; row: of the front, before it is taken; pieces, apart: the parts as bodies, and how far they are drawn apart;
- * corner: the first one of a box; zone, zoneHand: the chosen mark, and as a hand has it; faceMarks, pedestal, others, walls: as they came from the server; looking: at the print, "gcode": at the G-code file that is open. */
+/** state: the server's; line: status of the connection, a key of LINE_STATUS; tab: the open one; triangles: of the model; turning, placing, hand, zoneHand: rotation, place, plane and box while they are dragged; seen: {size_mm} of the drawn model.
+ * clicks: use of the next click on the model, a key of WANTED; part, zone: the chosen ones, 0 and null: none; corner: the first one of a box; facets: of the hull, and the highlighted one; figures: of the planes on the bench; row: of the front while its slider is dragged.
+ * pieces, apart: the parts as bodies, and their distance in the exploded view; faceMarks, pedestal, others, walls: as received; looking: the print is shown, "gcode": the open G-code file. */
 export const store = {
   state: null, line: "", tab: "model", dark: false, triangles: null, turning: null, placing: null, seen: null, clicks: "", part: 0, facets: null, figures: null, hand: null, row: null, pieces: null, apart: 0,
   corner: null, zone: null, zoneHand: null, faceMarks: null, pedestal: null, others: null, walls: new Map(), looking: false,

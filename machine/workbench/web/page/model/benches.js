@@ -66,7 +66,7 @@ export function platePanel() {
   } });
   onState(({ addable }) => sayIn("add-opened", addable && `Add ${addable} to the plate instead`));
   onNew(({ model, copies, beside, problem }) => [model ? [{ name: model.name, copies }, ...beside] : [], problem], ([models, problem]) => putRows(
-    models.map(({ name, copies }, number) => ({ id: `${number} ${name}`, told: `${copies} ${problem}`, make: () => plateRow(name, copies, number) })), $("plate-list")));
+    models.map(({ name, copies }, number) => ({ id: `${number} ${name}`, content: `${copies} ${problem}`, make: () => plateRow(name, copies, number) })), $("plate-list")));
 }
 
 function plateRow(name, copies, number) {
@@ -87,7 +87,7 @@ export function benchesPanel() {
   onNew(({ kept, benches }) => [kept, benches.map(({ number, name }) => [number, name])], () => offer("kept"));
   onNew(({ benches }) => benches, (benches) => {
     hide({ benches: benches.length < 2 });
-    putRows(benches.map((bench) => ({ id: `${bench.number}`, told: JSON.stringify(bench), make: () => benchRow(bench) })), $("benches-list"));
+    putRows(benches.map((bench) => ({ id: `${bench.number}`, content: JSON.stringify(bench), make: () => benchRow(bench) })), $("benches-list"));
   });
 }
 
@@ -95,14 +95,14 @@ export function benchesPanel() {
 export async function offer(what) {
   const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [];
   hide({ [`${what}-field`]: !found.length });
-  putRows(found.map((file) => ({ id: `${file.key}`, told: JSON.stringify(file), make: () => offerRow(what, file) })), $(`${what}-list`));
+  putRows(found.map((file) => ({ id: `${file.key}`, content: JSON.stringify(file), make: () => offerRow(what, file) })), $(`${what}-list`));
 }
 
 /** Buttons that open or remove a file; a refusal arrives by the connection. */
 function offerRow(what, { key, name = "", bytes, parts, written_s: written }) {
   const act = (method) => () => fetch(`${what}/${key}`, { method }).then(() => offer(what), () => {});
   const title = name || "cannot be read here", size = bytes ? `${Math.ceil(bytes / 1000).toLocaleString("en")} kB` : parts ? partsInWords(parts) : "uncut", words = `${size}, ${moment(written)}`;
-  const picture = what === "kept" ? made("img", { alt: "", loading: "lazy", src: `kept/${key}/picture` }) : "", open = button("", act("POST"), {}, picture, made("span", { text: title }), made("small", { text: words }));
+  const picture = what === "kept" ? [made("img", { alt: "", loading: "lazy", src: `kept/${key}/picture` })] : [], open = button("", act("POST"), {}, ...picture, made("span", { text: title }), made("small", { text: words }));
   return made("li", {}, open, removeButton(`Remove ${title}, ${words}`, act("DELETE")));
 }
 
@@ -124,7 +124,7 @@ function openDevicesLine() {
     clearTimeout(until);
     tellPairing(told);
     until = setTimeout(tellPairing, Math.max(0, 1000 * told.waits_until_s - Date.now()) + 100, told);
-    putRows(told.devices.map((device) => ({ id: `${device.number}`, told: JSON.stringify(device), make: () => deviceRow(device, line) })), $("devices"));
+    putRows(told.devices.map((device) => ({ id: `${device.number}`, content: JSON.stringify(device), make: () => deviceRow(device, line) })), $("devices"));
   }, () => {});
   listen("click", { reopen: () => line.send({ do: "reopen" }) });
 }

@@ -111,10 +111,7 @@ export function placePanel(picture) {
   };
   fields.forEach((field) => field.addEventListener("change", () => putFar(fields.map(({ value }) => Number(value)))));
   $("place-middle").addEventListener("click", () => putFar(MIDDLE));
-  onState(({ machine: { table } }) => {
-    const [x, y] = table.size_mm || [2 * table.radius_mm, 2 * table.radius_mm];
-    $("place-told").textContent = `The plate goes from ${-x / 2} to ${x / 2} mm along x, from ${-y / 2} to ${y / 2} mm along y.`.replaceAll("-", "−");
-  });
+  onState(({ plate_told: extent }) => tell({ "place-told": extent }));
   let told = "", copies = [[...MIDDLE, 0]]; // where they stand; the first is the one that hands turn, cut and mark
   subscribe(() => {
     const now = JSON.stringify(placeNow());

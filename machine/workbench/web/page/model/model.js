@@ -55,8 +55,7 @@ export function modelOf(picture) {
   });
 }
 
-/** Parts in their colours where they are looked at, single limbs only as pieces, else red faces; the row of the front under the hand before it is taken, whatever is told
- * meanwhile. */
+/** Show the parts in their colours, or the row of the front that is being chosen; on the Model tab the red faces. Single limbs are visible as pieces only. */
 function look(picture, red) {
   const { state: { search, parts, colours }, tab, row, part } = store;
   const planes = row ? row.planes : search?.planes.length ? search.planes : parts ? planesNow() : null, cut = tab !== "model" && planes;

@@ -77,8 +77,7 @@ const onRing = (axis, { centre, radius }, angle) => ringOf(centre, axis, radius,
 
 const ringPoints = (axis, ring) => [...ringOf(ring.centre, axis, ring.radius, RING_STEPS), onRing(axis, ring, 0)];
 
-/** What a hand that takes a ring holds: the angle at which it has taken it (from), and how many degrees an event has turned it since: the ring's place
- * that is seen nearest to the hand follows it, of those within a quarter turn of the last one, so that it does not jump to the other side. */
+/** Angle at which a ring was taken (from), and the degrees by which an event has turned it: the ring follows the pointer by its nearest visible point within a quarter turn of the last one. */
 function graspOf(picture, axis, ring, event) {
   const { left, top } = $("canvas").getBoundingClientRect(), eye = picture.eye(), middle = length(sub(eye, ring.centre));
   const nearest = ({ clientX, clientY }, angles) => angles.map((angle) => {

@@ -1,6 +1,6 @@
 // Parts panel: the search, its front as a slider, and every part as a card, chosen there as in the picture, with keys and a menu for what is done to it.
 
-import { $, alike, button, disable, hide, listen, made, needsKey, partsInWords, putNew, swatch, tell, tellIn, termsOf, toggle } from "../../../../view/template/elements.js";
+import { $, alike, button, disable, hide, listen, made, moveFocus, needsKey, partsInWords, putNew, swatch, tell, tellIn, termsOf, toggle } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 import { anglesOf, choosePart, figuresNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
@@ -111,7 +111,7 @@ export function partsList() {
     event.preventDefault();
     removePart(store.part);
   });
-  menuKeys();
+  moveFocus($("part-menu"), "button:enabled", { ArrowDown: 1, ArrowUp: -1 });
   subscribe(({ state: { locked, parts, colours }, part }) => {
     const figures = Array.from({ length: parts }, (_, k) => cardRows(k + 1));
     putNew($("parts-list"), [figures, locked, colours, planesNow(), part], () => figures.map((rows, k) => partCard(k + 1, rows)));
@@ -144,13 +144,4 @@ export function openMenu(part, x, y) {
   menu.style.left = `${Math.min(x, innerWidth - menu.offsetWidth - 4)}px`;
   menu.style.top = `${Math.min(y, innerHeight - menu.offsetHeight - 4)}px`;
   menu.querySelector("button:enabled")?.focus();
-}
-
-function menuKeys() {
-  $("part-menu").addEventListener("keydown", (event) => {
-    const step = { ArrowDown: 1, ArrowUp: -1 }[event.key], all = [...$("part-menu").querySelectorAll("button:enabled")];
-    if (!step) return;
-    all[(all.indexOf(document.activeElement) + step + all.length) % all.length].focus();
-    event.preventDefault();
-  });
 }

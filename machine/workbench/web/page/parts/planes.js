@@ -39,8 +39,7 @@ export const choosePart = (part) => update({ part: part <= store.state.parts ? p
 /** The part at a place of the platform's frame. */
 export const partAt = (place) => planesNow().reduce((part, plane, k) => (dot(plane.normal, place) > plane.offset_mm ? k + 2 : part), 1);
 
-/** A hand that has taken the chosen part's plane: plane, where that stands; wanted, where the hand has it; allowed, the last place that a trial has nothing against,
- * and checked, where the other parts were looked at as well, each with its figures; why: the trial that forbids what is wanted, null: none. */
+/** A plane that is dragged. plane: as shown; wanted: as dragged; allowed: the last one that a trial accepts, checked: the last one with all other parts checked, both with figures; why: the trial that rejects the wanted one, null: none. */
 function handNow() {
   if (store.hand) return store.hand;
   const here = { plane: planeNow(), figures: figuresNow() };

@@ -1,6 +1,5 @@
-// Print panel: where to print, what is asked before, and the print while it runs. It has a line of its own to the prints, which go on
-// whatever becomes of this page. And the page of the print in the place of picture and panel, beside the tab that prints in the picture's
-// alone; the two pages tell each other what to show.
+// Print panel: the printer, the questions before a print, and the running print, over a connection of its own: prints go on without this page.
+// Also the frame with the page of the print, which exchanges messages with this page.
 
 import { $, alike, disable, hide, listen, made, needsKey, notice, numberIn, onData, pressed, putNew, sayIn, tell, toggle, withWholeOptions } from "../../../../view/template/elements.js";
 import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";

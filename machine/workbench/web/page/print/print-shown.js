@@ -142,8 +142,7 @@ export function showHand(print, commands) {
 
 const EVERY_MS = 2000;
 
-/** A picture of the camera at a print server, anew every two seconds while it is looked at: of print(). It comes through the workbench, for
- * the page loads nothing from elsewhere. */
+/** The camera's picture of print(), fetched every two seconds while it is visible, through the workbench: the page loads nothing from elsewhere. */
 export function webcamPanel(print) {
   const picture = $("webcam"), show = (whether) => hide({ "webcam-line": !whether });
   const filmed = () => (print()?.webcam && !print().is_over ? print().number : 0);

@@ -1,5 +1,4 @@
-// Clicks: what the next click on the model is for, and what it does; the cross in the corner of the picture, which tells where x, y and z are
-// and looks along the one that is clicked; and the section view, the inside of the model, seen where a plane cuts it away.
+// Clicks: the use of the next click on the model; the axes in the corner of the picture, which turn the view; and the section view.
 
 import { $, listen, notice, numberIn, onKeys, pressed, toggle } from "../../../../view/template/elements.js";
 import { cross, dot } from "../../../../view/template/picture/math.js";
@@ -80,8 +79,7 @@ export function handsOf(camera, picture) {
   return { changed: picture.ask, pressed: clicked, asked, take: brush.take };
 }
 
-/** A click on the model: the facet is laid down, or the plane takes its place, or a mark is put there when that was asked for; else a part is
- * chosen, or, beside the model, none. */
+/** A click on the model is used by the active tool; without one it chooses a part, or none beside the model. */
 function press(event, picture) {
   const { clicks, tab } = store;
   if (!clicks || apartNow()) return void (tab === "parts" && choosePart(partMet(event, picture)));

@@ -5,8 +5,7 @@ import { add } from "../../../../view/template/picture/math.js";
 
 const ARROWS = { ArrowUp: 1, ArrowRight: 1, ArrowDown: -1, ArrowLeft: -1 };
 
-/** An element that is dragged: take(event) gives what follows the hand, a function of later events, null: not now; hold(what that gives) shows
- * it; put() ends it, and arrow keys that are let go, drop() leaves all as it was (Escape, a lost pointer). step(sign, event): what an arrow key gives. */
+/** A draggable handle. take(event): a function from later events to values, null: refused; hold(value): show it; put(): apply it; drop(): discard it (Escape, a lost pointer); step(sign, event): the value of an arrow key. */
 export function gripOf(element, { take, hold, put, drop, step }) {
   let follow = null, stepping = false;
   const end = (act) => () => {

@@ -45,8 +45,7 @@ function thingsOn(gl, things) {
   };
 }
 
-/** What lies on the bench, drawn when the browser next draws: what the scene has is put there by the calls at the end, and what is in
- * `drawn` is called after every picture. null: there is no WebGL2. */
+/** The picture of the bench, drawn with the browser's next frame; `drawn`: functions called after each frame. null without WebGL2. */
 export function pictureOf(canvas, camera) {
   const gl = cardOf(canvas);
   if (!gl) return null;

@@ -1,5 +1,4 @@
-// Tools: the brush, which marks or erases faces by strokes of a hand, every stroke one step that can be undone; and the measure: two points
-// of the model, the distance between them, and the angle between the faces on which they lie.
+// Tools: the brush, which marks or erases faces, one undo step for each stroke; and the measure: distance of two points and angle of their faces.
 
 import { $, hide, numberIn, tell } from "../../../../view/template/elements.js";
 import { add, dot, length, mix, RAD, scaled, sub, turned } from "../../../../view/template/picture/math.js";

@@ -84,8 +84,7 @@ export function planeBefore({ normal, offset_mm: offset }, matrix) {
   return { normal: turned(undone(matrix), normal), offset_mm: offset - dot(normal, matrix.slice(12, 15)) };
 }
 
-/** Middle and reach of what a plane cuts of the triangles, without what later planes have taken: {centre_mm, radius_mm}, or null.
- * All in the frame of the platform, in which `matrix` puts the triangles. */
+/** Centre and radius of the section of a plane, without what later planes remove: {centre_mm, radius_mm} in the frame of the build plate, or null. matrix: from the model to that frame. */
 export function sectionOf({ corners, count }, plane, later, matrix) {
   const heights = (place, { normal, offset_mm: offset }) => dot(normal, place) - offset, found = [];
   const own = planeBefore(plane, matrix), [x, y, z] = own.normal, high = [0, 0, 0];

@@ -1,5 +1,4 @@
-// Settings panel: the profile's own keys in groups that fold, for beginners or for all, searched by a word; of all parts or of one; what is
-// changed is marked, and taken back one by one, by the profile it belongs to, or all at once.
+// Settings panel: the keys of the profile in groups, by level and search, of all parts or of one; changes are marked and can be reset.
 
 import { $, button, disable, hide, listen, made, numberIn, optionsOf, pressed, putNew, putRows, tell } from "../../../../view/template/elements.js";
 import { ask, newest, send } from "../line.js";
@@ -48,7 +47,7 @@ export function settingsPanel() {
     const groups = groupedBy(rows, ({ group }) => group);
     putRows([...groups].flatMap(([group, own]) => {
       const folded = !open && kept.now.folded.includes(group), title = groupTitle(own, folded, () => { fold(group, !folded); });
-      const row = (setting) => ({ id: setting.key, told: JSON.stringify([setting, wrongs.get(setting.key), kept.now.level]), make: () => settingRow(setting, { wrong: wrongs.get(setting.key), set, again: list, explained }) });
+      const row = (setting) => ({ id: setting.key, content: JSON.stringify([setting, wrongs.get(setting.key), kept.now.level]), make: () => settingRow(setting, { wrong: wrongs.get(setting.key), set, again: list, explained }) });
       return [title, ...(folded ? [] : own.map(row))];
     }), $("settings-list"));
   };
@@ -106,7 +105,7 @@ function showProfiles(profiles) {
   const rows = Object.entries(profiles).map(([kind, { labels, name }]) => {
     const onchange = ({ target }) => ask({ do: "profile", kind, name: target.value }, (refusal) => { if (refusal) target.value = name; });
     const select = made("select", { onchange, title: name }, ...optionsOf(Object.entries(labels), name));
-    return { id: kind, told: JSON.stringify([labels, name]), make: () => made("label", {}, kind, select) };
+    return { id: kind, content: JSON.stringify([labels, name]), make: () => made("label", {}, kind, select) };
   });
   putRows(rows, $("profiles-list"));
 }
@@ -144,9 +143,9 @@ function tellTakeBack(changed, part) {
 }
 
 function groupTitle(own, folded, turn) {
-  const [{ group, title, about }] = own, told = JSON.stringify([title, own.length, folded]);
+  const [{ group, title, about }] = own, content = JSON.stringify([title, own.length, folded]);
   const more = { title: `${about}.`, ariaExpanded: String(!folded) }, words = () => [made("span", { text: title }), made("small", { text: own.length })];
-  return { id: `group ${group}`, told, make: () => made("h2", {}, button("", turn, more, ...words())) };
+  return { id: `group ${group}`, content, make: () => made("h2", {}, button("", turn, more, ...words())) };
 }
 
 /** A text into the clipboard, or marked for the person to take where the browser allows no more. */
@@ -157,8 +156,7 @@ async function copyText(element, button) {
   setTimeout(() => { button.textContent = "Copy"; }, 3000);
 }
 
-/** wrong: {text, typed}, what was refused last; set(key, value, typed) asks for a value, null: as it was; again(): called when a person
- * leaves what was typed in, for what has been told meanwhile; explained: the keys whose meaning is shown. */
+/** wrong: {text, typed} of the last refusal; set(key, value, typed): request a value, null: the profile's; again(): show what has changed while the user typed; explained: keys whose meaning is shown. */
 function settingRow(setting, { wrong, set, again, explained }) {
   const { key, label, unit, kind, value, changed, was, placeholders = [] } = setting, input = inputOf(setting, wrong ? wrong.typed : value);
   const meaning = made("small", { text: setting.meaning, id: `meaning-${key}`, hidden: !explained.has(key) });

@@ -1,5 +1,4 @@
-// Slices panel: copies and pauses, the parts sliced and their walls in the picture, what the print takes, what the dry run complains of, what one piece
-// would cost, and all that is saved of a bench, in one menu.
+// Slices panel: copies and pauses, slicing with the walls in the picture, findings, the comparison with one piece, and the Save menu.
 
 import { $, disable, fill, findingButton, hide, listen, listIn, made, numberIn, onData, putTable, removeButton, rowOf, sayIn, swatch, tell, tellIn, toggle } from "../../../../view/template/elements.js";
 import { cross, scaled, sub, unit } from "../../../../view/template/picture/math.js";
@@ -105,8 +104,7 @@ export function comparePanel() {
 const PIECE = 7; // numbers of a straight piece: two ends and its height
 const BROAD = 1.1; // half the width of a bead, by its height
 
-/** Triangles {places, colours} of a part's walls: an upright band along every piece and a level one on it, as broad as a bead, so
- * that a slope has no gaps. bytes: as the server gives them. */
+/** Triangles {places, colours} of a part's walls, from the server's bytes: an upright band along each piece, and a level one as wide as a bead, so that slopes have no gaps. */
 function bandsOf(bytes, colour) {
   const values = new Float32Array(bytes), way = [...values.subarray(0, 3)], count = (values.length - 3) / PIECE;
   const places = new Float32Array(36 * count), colours = new Uint32Array(12 * count).fill(wordOf(rgb(colour), 254));
