@@ -16,14 +16,15 @@ from tools.docs.harness import DOCS, marked
 KEYS, STATES = DOCS / "keys.md", DOCS / "states.mmd"
 AXIS = re.compile(r"(?<=^machine)\.(x|y|z|tilt|turn)\.")
 UNIT = re.compile(r", (°C|N|s|deg|g/cm³|mm²|mm|MPa)(/s²|/s)?$|, mm³/s$")
+FILLERS = frozenset("a an at by for in its of on or the to".split())
 SHORT = {
     r"^a (whole )?number from (\S+)$": r"≥ \2",
-    "^a whole number from (.*)": r"\1, whole",
+    "^a whole number from (.*)": r"\1",
     "^a number (from )?": "",
     "above 0 and up to ": "≤ ",
     "above (\\S+) and up to ": r"> \1, ≤ ",
     r"(-?[\d.]+) to (-?\d)": r"\1–\2",
-    "true or false": "true/false",
+    "true or false": "",
     "^(a list of|one of|a|one) ": "",
     "tables with the keys ": "tables of ",
     '"': "",
@@ -37,7 +38,7 @@ def table(section: str) -> str:
     for key, field in keys(SECTIONS[section], f"{section}."):
         shown = json.dumps(field.get_default(), default=str) if not field.is_required() else _given(defaults, key)
         stem = AXIS.sub(".*.", key)
-        rows[stem, _beginning(field.description or ""), _short(allowed(field)), "" if stem != key else shown].append(key)
+        rows[stem, _meaning(key, field.description or ""), _short(allowed(field)), "" if stem != key else shown].append(key)
     lines = ["| key | meaning | allowed | default |", "|---|---|---|---|"]
     for (_, meaning, values, shown), names in rows.items():
         default = f"`{shown}`" if shown and shown != "null" else ""
@@ -57,6 +58,14 @@ def _joined(names: list[str]) -> str:
     """Keys in one cell: `machine.x.limits_mm`, or `machine.x|y|z.limits_mm` with the bars escaped for Markdown."""
     axes = "\\|".join(found[1] for name in names if (found := AXIS.search(name)))
     return f"`{AXIS.sub(f'.{axes}.', names[0]) if axes else names[0]}`"
+
+
+def _meaning(key: str, description: str) -> str:
+    """The beginning of a description; "" if it says no more than the words of the key."""
+    meaning = _beginning(description)
+    stems = {word[:5].rstrip("s") for word in re.findall("[a-z]+", key)}
+    words = set(re.findall("[a-z]+", meaning.lower())) - FILLERS
+    return "" if {word[:5].rstrip("s") for word in words} <= stems else meaning
 
 
 def _beginning(meaning: str) -> str:
