@@ -1,4 +1,4 @@
-"""Number of cores: the whole chain, from the search to the G-code and the viewer page, writes the same bytes on one and on three."""
+"""Number of cores: the chain from the search to the G-code and the viewer page writes the same bytes on one and on three."""
 
 import subprocess
 import sys
