@@ -20,7 +20,7 @@ from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import best_orientation, in_words, set_on_plate
 from mdp.joint import Joint, weakest_of
-from profiles.errors import ProfileError
+from profiles.errors import ProfileError, counted
 from profiles.frozen import Frozen
 from profiles.messages import terminal_words
 from profiles.places import OF_KIND, shipped
@@ -160,6 +160,7 @@ def _front(decomposition: Decomposition) -> list[Table]:
         areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", f"{row.cost_mm2:.1f}"]
         rows.append([f"{row.parts}{' (chosen)' * row.chosen}", *areas, time, filament])
     notes = [f"chosen: {row.reason}" for row in front if row.chosen]
+    notes += [f"{counted(row.parts, 'part')} only on request: {row.flaw}" for row in front if row.flaw and not row.chosen]
     notes.append("--parts selects another row; time and filament are estimates")
     return [
         _table(

@@ -30,7 +30,7 @@ from machine.workbench.work.folders import work_of
 from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.directions.orientation import set_on_plate
-from mdp.joint import is_sound, joints_of
+from mdp.joint import flaw_of, joints_of
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
@@ -121,13 +121,14 @@ def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ..
 
 
 def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
-    """A row of the front with its time and filament; without them if it cannot be cut, or is not sound."""
+    """A row of the front with its time and filament; without them if it cannot be cut, or has a flaw."""
     row = bench.rows[number]
     with suppress(PlanError):
         parts = planned_parts(row)
         cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts, front=()), prices=True)
         by_hand = sum(1 for _ in takewhile(bench.locked.__contains__, reversed(parts)))
-        return cut.front[0] if is_sound(cut.mesh, cut.parts, bench.profile, by_hand) else replace(row, sound=False)
+        flaw = flaw_of(cut.mesh, cut.parts, bench.profile, by_hand)
+        return replace(row, flaw=flaw) if flaw else cut.front[0]
     return row
 
 

@@ -21,8 +21,8 @@ export function slicesPanel(showFinding) {
   });
   onNew(({ sliced }) => sliced, (sliced) => {
     const { told = [], joints = [], verdict } = sliced || {};
-    if (!sliced && store.looking === true) update({ looking: false });
-    else showVerdict(verdict, showFinding);
+    if (sliced) showVerdict(verdict, showFinding);
+    else if (store.looking === true) update({ looking: false });
     tellIn("sliced-told", told);
     putTable($("joints"), joints, JOINT_HEAD, () => joints.map(figuresRow));
     showFindings(sliced, showFinding);
