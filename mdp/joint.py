@@ -80,7 +80,7 @@ def weakest_of(joints: Sequence[Joint]) -> Joint | None:
 
 
 def flaw_of(mesh: Mesh, parts: Sequence[Part], profile: Profile, by_hand: int = 0) -> str:
-    """What is wrong with a decomposition: a joint breaks when the nozzle pushes the far end of what it holds, the first part is
+    """The flaw of a decomposition in words: a joint breaks when the nozzle pushes the far end of what it holds, the first part is
     a sliver, or a cut passes through the bulk of the model, where its seam would surround the whole model. Empty if it is sound,
     and on the paper's terms, which have none of these. by_hand: number of last parts that the user cut off; these are not tested.
     """
