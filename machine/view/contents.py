@@ -88,7 +88,6 @@ def of_print(
 
 
 def compared(header: dict[str, Any], alternatives: Sequence[Alternative]) -> dict[str, Any]:
-    """Add alternatives to the header of a print."""
     return header | {"report": with_alternatives(header["report"], alternatives)}
 
 

@@ -48,11 +48,9 @@ class Watched:
         self._asked, self._end_reported = Event(), Event()
 
     def follow(self, status: PrintStatus) -> None:
-        """Set the newest status."""
         self._status = status
 
     def state(self) -> bytes:
-        """The state as JSON."""
         self._asked.set()
         if self._ended:
             self._end_reported.set()

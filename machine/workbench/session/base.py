@@ -42,7 +42,6 @@ class Observable:
         self._changed = asyncio.Event()
 
     def notify(self) -> None:
-        """Notify the pages of a change."""
         self.version += 1
         self._changed.set()
         self._changed = asyncio.Event()
@@ -256,7 +255,6 @@ class Derived(Generic[Value]):
 
     @property
     def result(self) -> Value | None:
-        """The result for the current bench, or None."""
         return self.done if self._of is not None and self._of == self._key_of(self._session.bench) else None
 
     @property

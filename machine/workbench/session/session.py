@@ -25,7 +25,6 @@ from machine.workbench.bench.bench import (
     with_prices,
     with_profile,
     with_rotation,
-    with_rows,
     with_scaled_model,
 )
 from machine.workbench.bench.model import Model
@@ -358,7 +357,7 @@ class Session(SessionBase):
         effect = effect_of_change(before.profile, bench.profile)
         if effect == Effect.REACH and bench.rows:
             rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).rejected]
-            bench = with_rows(bench, rows)
+            bench = replace(bench, rows=tuple(rows), recommended=bench.recommended if rows else 0)
         if bench.cuts is None or effect < Effect.REACH:
             return bench, ""
         bench, removed = await self.trials.without_invalid(bench)

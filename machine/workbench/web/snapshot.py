@@ -286,7 +286,6 @@ def _words(steps: Sequence[Step]) -> list[str]:
 
 
 def _stop(stop: Stop) -> dict[str, str]:
-    """A pause in words."""
     where = f"at {stop.height_mm or 0.0:.12g} mm" if stop.layer is None else f"before layer {stop.layer}"
     return {"kind": "filament change" if stop.change else "pause", "where": f"part {stop.part}, {where}"}
 

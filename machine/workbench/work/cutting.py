@@ -155,7 +155,6 @@ def make_plan(tell: Tell, bench: Bench) -> str:
 
 
 def make_project(tell: Tell, bench: Bench, out: Path) -> None:
-    """Write the project file of the bench."""
     decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     check_stop_parts(bench.stops, len(decomposition.parts))
     compilers.wait_for(compilers.PICTURES)
@@ -271,7 +270,6 @@ def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
 
 
 def make_ready(tell: Tell, number: int, bench: Bench) -> None:
-    """Prepare the bench with this number for planes."""
     _trials(number, bench)
 
 
