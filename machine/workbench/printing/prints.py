@@ -75,7 +75,13 @@ class Prints(Observable):
             "journals": self._journals_state(),
             "history": self._history,
             "prints": [
-                {**job.state.json(), "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
+                {
+                    **job.state.json(),
+                    "webcam": bool(job.state.webcam),  # the page gets its picture from this server
+                    "number": job.number,
+                    "holder": job.holder,
+                    "held": bool(self._pages[job.holder]),
+                }
                 for job in self.prints
             ],
         }

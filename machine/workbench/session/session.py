@@ -142,13 +142,11 @@ class Session(SessionBase):
         if self._opened is None or model is None:
             raise PlanError("no model has just been opened over another one, so none can be put beside that")
         check_first_plate(model)
-        await self._add(self._opened[0], model.path, model.name)
+        await self.add_model(model.path, model.name, self._opened[0])
 
-    async def add_model(self, path: Path, name: str) -> None:
-        """Put the model of a file on the plate, beside that on the bench. Raises UserError."""
-        await self._add(self.bench, path, name)
-
-    async def _add(self, bench: Bench, path: Path, name: str) -> None:
+    async def add_model(self, path: Path, name: str, bench: Bench | None = None) -> None:
+        """Put the model of a file on the plate, beside that on the bench, None: the present one. Raises UserError."""
+        bench = bench or self.bench
         with self.waiting(f"reading {name}"):
             model = await self._read(path, name, bench.profile)
         self.do(f"add {name} to the plate", with_beside(bench, (*bench.beside, (model, 1))))
