@@ -70,7 +70,7 @@ class SessionBase(Observable):
 
     problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
     gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; note: what the last
-    command has changed beside what it was for; quick, long, hand: its tasks in the pools; aside: tasks for which nobody waits;
+    command has changed beside what it was for; quick, long, hand: its tasks in the pools; aside: tasks that no one waits for;
     received: the files of its pages; others: file of the parts of the other models on the plate (see work.plate); others_version:
     how often a task has added some; followers: called after every change of the bench.
     """

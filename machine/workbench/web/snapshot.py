@@ -183,7 +183,7 @@ def snapshot(session: Session) -> dict[str, Any]:
 
 
 def _steps(history: History) -> dict[str, Any]:
-    """What can be undone and redone."""
+    """The steps that can be undone and redone."""
     undo, redo = (_words(steps) for steps in ((*history.before, history.now)[1:], history.undone))
     return {"undo": undo[0] if undo else "", "redo": redo[0] if redo else "", "steps": {"undo": undo, "redo": redo}}
 
