@@ -39,7 +39,7 @@ def print_page(
     live: bool = False,
 ) -> bytes:
     """The page of a whole print; arguments as for of_print."""
-    return page(name, of_print(name, program, profile, known=known, alternatives=alternatives, live=live), live)
+    return page(name, of_print(name, program, profile, known, alternatives, live), live)
 
 
 def with_comparison(content: bytes, alternatives: Sequence[Alternative]) -> bytes:

@@ -16,15 +16,7 @@ import numpy as np
 from machine.pipeline import compilers
 from machine.pipeline.choice import lies_freely, orientation_in_words, pricing, standing_in_words
 from machine.pipeline.given_plan import with_file_marks
-from machine.pipeline.pictures import (
-    PLAIN,
-    contact_sheet,
-    front_picture,
-    parts_picture,
-    parts_together,
-    png_bytes,
-    small_picture,
-)
+from machine.pipeline.pictures import PLAIN, contact_sheet, front_picture, parts_picture, parts_together, png_bytes, small_picture
 from machine.pipeline.project import PICTURE_PX, STANDING, project_bytes, read_folder, with_meshes_beside
 from machine.planning.fit import check_parts
 from machine.planning.stops import check_stop_parts
