@@ -40,6 +40,14 @@ class Observable:
         self.version, self.closed = 0, False
         self.listeners: list[Callable[[], None]] = []
         self._changed = asyncio.Event()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def launch(self, work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
+        """Start work in the background."""
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
 
     def notify(self) -> None:
         self.version += 1
@@ -90,7 +98,6 @@ class SessionBase(Observable):
         self.others, self.others_version = self.new_file(), 0
         self._others_profile = bench.profile
         self.followers.append(self._drop_others)
-        self._tasks: set[asyncio.Task[None]] = set()
 
     @property
     def bench(self) -> Bench:
@@ -137,9 +144,7 @@ class SessionBase(Observable):
             finally:
                 self.answer(ask, refusal)
 
-        task = asyncio.create_task(attempt())
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        task = self.launch(attempt())
         task.add_done_callback(lambda _: work.close())  # if it was cancelled before it began
         return task
 
