@@ -94,7 +94,11 @@ def keep_newest(
 
     Raises OSError.
     """
-    newest = sorted(paths, key=when, reverse=True)
+    dates = dict[Path, Any]()
+    for path in paths:
+        with suppress(FileNotFoundError):  # another process has deleted it
+            dates[path] = when(path)
+    newest = sorted(dates, key=dates.__getitem__, reverse=True)
     kept = [*newest[:count], *(path for path in newest[count:] if in_use(path))]
     for path in newest[count:]:
         if path in kept:

@@ -40,6 +40,8 @@ FLOOR = (236.0, 238.0, 241.0)
 NOZZLE = (128.0, 131.0, 138.0)
 SPREAD = 0.13  # gap between exploded parts as a fraction of the model's size
 SEGMENTS = 96
+SMALL_PX, SMALL_COLOURS = (136, 102), 32
+FINER = 3  # times as many pixels of a small picture are drawn for each that is kept
 
 
 def parts_picture(decomposition: Decomposition, profile: Profile, size: tuple[int, int] = (1600, 800)) -> Image:
@@ -69,6 +71,19 @@ def parts_together(decomposition: Decomposition, profile: Profile, size: tuple[i
     risky = needing_upright(decomposition.mesh, profile)
     parts = [part.mesh for part in decomposition.parts]
     return draw(parts, list(part_colours(len(parts))), axes=best_view(decomposition.mesh, risky), size=size)
+
+
+def small_picture(meshes: Sequence[Mesh], colours: Sequence[tuple[float, ...]]) -> bytes:
+    """A small PNG of meshes in their places, on a transparent background, for a list of models."""
+    width, height = SMALL_PX
+    fine = draw(meshes, colours, size=(FINER * width, FINER * height)).reshape(height, FINER, width, FINER, 3)
+    covered = (fine != 255).any(axis=4, keepdims=True)
+    share = covered.mean(axis=(1, 3))
+    colour = (fine * covered).mean(axis=(1, 3)) / np.maximum(share, 1e-9)
+    pixels = np.concatenate([colour, 255 * share], axis=2).round().astype(np.uint8)
+    file = BytesIO()
+    Pillow.fromarray(pixels).quantize(SMALL_COLOURS, Pillow.Quantize.FASTOCTREE).save(file, "PNG", optimize=True)
+    return file.getvalue()
 
 
 def contact_sheet(decomposition: Decomposition, machine: Machine, frame_pixels: int = 480) -> Image:

@@ -49,13 +49,7 @@ def of_parts(decomposition: Decomposition, profile: Profile, alternatives: Seque
 
 
 def of_print(
-    name: str,
-    program: Program,
-    profile: Profile,
-    *,
-    known: bool = True,
-    alternatives: Sequence[Alternative] = (),
-    live: bool = False,
+    name: str, program: Program, profile: Profile, known: bool, alternatives: Sequence[Alternative], live: bool
 ) -> bytes:
     """Pack the page of a whole print. known: the print was made for this machine; live: the page follows a running print."""
     run, by_layer = program.run, paths.layers_of(program.run.program, profile.process.layer_height_mm)
@@ -81,14 +75,7 @@ def of_print(
         "front": [] if decomposition is None else front_records(decomposition),
         "findings": scene.finding_records(run, profile.machine, known, shown),
         "report": print_report(
-            program,
-            profile,
-            by_layer,
-            parts,
-            joints=joints,
-            alternatives=alternatives,
-            known=known,
-            ours=source != "foreign",
+            program, profile, by_layer, parts, joints=joints, alternatives=alternatives, known=known, ours=source != "foreign"
         ),
     }
     header["summary"] = _summary(header, len(by_layer.first) if len(shown) else None)
@@ -97,7 +84,6 @@ def of_print(
 
 
 def compared(header: dict[str, Any], alternatives: Sequence[Alternative]) -> dict[str, Any]:
-    """Add alternatives to the header of a print."""
     return header | {"report": with_alternatives(header["report"], alternatives)}
 
 

@@ -49,7 +49,11 @@ def parts_report(
     decomposition: Decomposition, profile: Profile, joints: Sequence[Joint], alternatives: Sequence[Alternative] = ()
 ) -> dict[str, Any]:
     """The report of a page of parts alone; alternatives: their costs, if known."""
-    facts = [["parts", str(len(decomposition.parts))], ["volume", _cm3(decomposition.volume_mm3)], *_names(profile)]
+    facts = [
+        ["parts", str(len(decomposition.parts))],
+        ["volume", f"{decomposition.volume_mm3 / 1000.0:.2f} cm³"],
+        *_names(profile),
+    ]
     rows = [_solid(part, profile) for part in decomposition.parts]
     parts = _table("Parts", SOLID, rows, [RISKY])
     tables = [
@@ -259,10 +263,6 @@ def _format_fixed(value: float, digits: int) -> str:
 
 def _share(part: float, whole: float) -> str:
     return f"{_format_fixed(100.0 * part / whole if whole > 0 else 0.0, 1)} %"
-
-
-def _cm3(volume_mm3: float) -> str:
-    return f"{volume_mm3 / 1000.0:.2f} cm³"
 
 
 def settings_tables(profile: Profile) -> list[Table]:

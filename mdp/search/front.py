@@ -197,4 +197,8 @@ def _savings_notes(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
         price = f", but take {longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f", but take {longer_s:.0f} s longer"
     elif more_mm >= 50.0:
         price = f", but take {more_mm / 1000.0:.1f} m more filament"
-    return (f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm² of visible marks{price}: {advice('parts', parts)}",)
+    less, more = (max(row.support_area_mm2, 0.0) for row in (fewest_scars, taken))
+    support = f" (support on {less:.0f} instead of {more:.0f} mm²)" if round(less) < round(more) else ""
+    return (
+        f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm² of visible marks{support}{price}: {advice('parts', parts)}",
+    )

@@ -15,10 +15,8 @@ from pathlib import Path
 import manifold3d as m3
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
-from machine.pipeline.pictures import PLAIN
-from machine.pipeline.raster import draw
+from machine.pipeline.pictures import PLAIN, small_picture
 from mdp.kernels.kernel import kernel
 from mdp.plane import Plane
 from mdp.read import read_mesh
@@ -27,8 +25,6 @@ from mdp.search.plan_writing import plan_text
 from tools.docs.harness import ROOT
 
 FOLDER = ROOT / "mdp" / "demos"
-PICTURE_SIZE, PICTURE_COLOURS = (136, 102), 32
-FINER = 3  # times as many pixels are drawn for each that is kept
 Point = tuple[float, float, float]
 Knot = tuple[float, float, float, float]
 Limb = list[Knot]  # x, y, z, radius of the knots of a chain of round cones
@@ -297,14 +293,7 @@ def write_plan(folder: Path, name: str) -> None:
 def write_picture(folder: Path, name: str) -> None:
     """Write the small picture of a demo, on a transparent background, beside it."""
     mesh, _ = read_mesh(folder / f"{name}.ply")
-    width, height = PICTURE_SIZE
-    fine = draw([mesh], [PLAIN], size=(FINER * width, FINER * height)).reshape(height, FINER, width, FINER, 3)
-    covered = (fine != 255).any(axis=4, keepdims=True)
-    share = covered.mean(axis=(1, 3))
-    colour = (fine * covered).mean(axis=(1, 3)) / np.maximum(share, 1e-9)
-    pixels = np.concatenate([colour, 255 * share], axis=2).round().astype(np.uint8)
-    picture = Image.fromarray(pixels).quantize(PICTURE_COLOURS, Image.Quantize.FASTOCTREE)
-    picture.save(folder / f"{name}.png", optimize=True)
+    (folder / f"{name}.png").write_bytes(small_picture([mesh], [PLAIN]))
 
 
 def main(folder: Path, names: Sequence[str] = tuple(DEMOS)) -> None:

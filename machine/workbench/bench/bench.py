@@ -192,13 +192,17 @@ def with_beside(bench: Bench, beside: tuple[tuple[Model, int], ...]) -> Bench:
         if model.name in names:
             raise PlanError(f"{model.name} is on the plate already: set its number of copies to print more")
         names.add(model.name)
-    if bench.model.plate is not None and beside:
-        raise PlanError(
-            f"plate {bench.model.plate} of {bench.model.name} is open: models go beside the first plate of a file only"
-        )
+    if beside:
+        check_first_plate(bench.model)
     if (count := bench.copies + sum(copies for _, copies in beside)) > MOST_COPIES:
         raise PlanError(f"{count} models are to stand on the plate: {MOST_COPIES} at most are allowed")
     return replace(bench, beside=beside)
+
+
+def check_first_plate(model: Model) -> None:
+    """Raise PlanError for another plate than the first of its file, which goes beside no model."""
+    if model.plate is not None:
+        raise PlanError(f"plate {model.plate} of {model.name} is open: only the first plate of a file goes beside other models")
 
 
 def with_scaled_model(bench: Bench, model: Model, factor: float) -> Bench:
@@ -291,11 +295,6 @@ def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:
     if effect == Effect.FRONT:
         return replace(changed, rows=(), recommended=0, priced=True)
     return replace(changed, rows=tuple(replace(row, time_s=None, filament_mm=None) for row in bench.rows), priced=False)
-
-
-def with_rows(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
-    """Keep only these rows of the front; pricing them determines the recommended one."""
-    return replace(bench, rows=tuple(rows), recommended=bench.recommended if rows else 0)
 
 
 def rows_to_price(bench: Bench) -> list[int]:

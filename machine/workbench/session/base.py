@@ -15,6 +15,7 @@ from machine.workbench.work.folders import Received
 from machine.workbench.work.worker_pool import CLOSED, TaskQueue, WorkerPools
 from profiles.effect import effect_of_change
 from profiles.errors import UserError
+from profiles.files import modified_s
 from profiles.frozen import Effect
 from profiles.messages import terminal_words
 
@@ -39,9 +40,16 @@ class Observable:
         self.version, self.closed = 0, False
         self.listeners: list[Callable[[], None]] = []
         self._changed = asyncio.Event()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def launch(self, work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
+        """Start work in the background."""
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
 
     def notify(self) -> None:
-        """Notify the pages of a change."""
         self.version += 1
         self._changed.set()
         self._changed = asyncio.Event()
@@ -54,6 +62,11 @@ class Observable:
             await self._changed.wait()
 
 
+def _written(file: Path) -> float:
+    """Time of a file's last change, 0 without one."""
+    return modified_s(file) if file.exists() else 0.0
+
+
 async def in_loop(loop: asyncio.AbstractEventLoop, work: Coroutine[Any, Any, Value]) -> Value:
     """Run a coroutine in another event loop and return its result; cancelling the wait cancels the coroutine."""
     return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, loop))
@@ -64,9 +77,10 @@ class SessionBase(Observable):
     executed at a time, and nothing else changes the bench meanwhile.
 
     problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
-    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; note: what the
-    last command has changed beside what it was for; quick, long, hand: its tasks in the pools; received: the files of its pages;
-    followers: called after every change of the bench.
+    gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; note: what the last
+    command has changed beside what it was for; quick, long, hand: its tasks in the pools; aside: tasks that no one waits for;
+    received: the files of its pages; others: file of the parts of the other models on the plate (see work.plate); others_version:
+    how often a task has added some; followers: called after every change of the bench.
     """
 
     def __init__(self, bench: Bench, pools: WorkerPools) -> None:
@@ -76,12 +90,14 @@ class SessionBase(Observable):
         self.answers: dict[str, str] = {}
         self.busy = self.note = ""
         self.quick, self.long, self.hand = TaskQueue(pools.quick), TaskQueue(pools.long), TaskQueue(pools.hand)
+        self.aside = TaskQueue(pools.quick)
         self.followers: list[Callable[[], None]] = []
         self.turn = asyncio.Lock()  # fair: first come, first served
         self.received = Received()
         self._files = count(1)
-        self._others = bench.profile, self.new_file()
-        self._tasks: set[asyncio.Task[None]] = set()
+        self.others, self.others_version = self.new_file(), 0
+        self._others_profile = bench.profile
+        self.followers.append(self._drop_others)
 
     @property
     def bench(self) -> Bench:
@@ -96,14 +112,25 @@ class SessionBase(Observable):
         """A path for a task's output, deleted with the session at the latest."""
         return self.received.path / f"made-{next(self._files)}"
 
-    def others_of(self, bench: Bench) -> Path:
-        """The file for the parts of the other models on the plate (see work.plate); a new one after a change of the profile that
-        may lead to other parts."""
-        profile, file = self._others
-        if effect_of_change(profile, bench.profile) > Effect.NONE:
-            file.unlink(missing_ok=True)
-            self._others = bench.profile, self.new_file()
-        return self._others[1]
+    def _drop_others(self) -> None:
+        """Begin another file of the other models' parts after a change of the profile that may lead to other parts."""
+        profile, self._others_profile = self._others_profile, self.bench.profile
+        if effect_of_change(profile, self._others_profile) > Effect.NONE:
+            self.others.unlink(missing_ok=True)
+            self.others = self.new_file()
+
+    @contextmanager
+    def cutting_others(self) -> Iterator[Path]:
+        """The file of the other models' parts, for a task that adds those that it lacks; then they are placed again, as they are
+        cut now, also if the task fails or is stopped."""
+        others = self.others
+        before = _written(others)
+        try:
+            yield others
+        finally:
+            if _written(others) != before and not self.closed:
+                self.others_version += 1
+                self.become(self.history)
 
     def start(self, work: Coroutine[Any, Any, None], ask: object = None) -> "asyncio.Task[None]":
         """Start work in the background; its error becomes the sentence that pages show. ask: name of its command."""
@@ -117,9 +144,7 @@ class SessionBase(Observable):
             finally:
                 self.answer(ask, refusal)
 
-        task = asyncio.create_task(attempt())
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        task = self.launch(attempt())
         task.add_done_callback(lambda _: work.close())  # if it was cancelled before it began
         return task
 
@@ -235,7 +260,6 @@ class Derived(Generic[Value]):
 
     @property
     def result(self) -> Value | None:
-        """The result for the current bench, or None."""
         return self.done if self._of is not None and self._of == self._key_of(self._session.bench) else None
 
     @property

@@ -29,18 +29,18 @@ class Keeping:
         self._kept: weakref.ref[Bench] | None = None
         self._saving: asyncio.Task[None] | None = None
         self._writing, self._ended = asyncio.Lock(), asyncio.Event()
-        self._path: Path | None = None  # of the saved model
+        self._work: tuple[Path, int | None] | None = None  # file and plate of the saved model, which identify its work
         self.released = 0  # how often work of this session became earlier work, or was opened again
         self._opening = False
         self._trouble = ""
-        self._reported: tuple[str, Path | None] = "", None  # error, and the model for which it was reported
+        self._reported: tuple[str, object] = "", None  # error, and the work for which it was reported
         session.followers.append(self._follow)
 
     @property
     def behind(self) -> bool:
-        """Whether there is a change that no write has attempted to save."""
+        """Whether there is a change that no write has attempted to save; an empty bench leaves its folder."""
         kept = None if self._kept is None else self._kept()
-        return self._session.bench is not kept and self._session.bench.model is not None
+        return self._session.bench is not kept and (self._session.bench.model is not None or self._folder is not None)
 
     def _follow(self) -> None:
         """Schedule a write after a change."""
@@ -68,7 +68,7 @@ class Keeping:
             async with self._writing:
                 self._release()
             self._folder, self._lock, lock = folder, lock, None
-            self._path = None if self._session.bench.model is None else self._session.bench.model.path
+            self._work = _identity(self._session.bench)
         finally:
             if lock is not None:
                 os.close(lock)
@@ -101,7 +101,7 @@ class Keeping:
             return ""
         async with self._writing:
             self._release()
-            self._path = None
+            self._work = None
         cut = f", cut into {bench.parts} parts," if bench.parts > 1 else ""
         return f"{bench.model.name}{cut} is kept under Earlier work (Undo brings it back)"
 
@@ -114,20 +114,24 @@ class Keeping:
 
     async def _write_newest(self) -> None:
         async with self._writing:
-            bench = self._session.bench
+            bench, released = self._session.bench, self.released
             self._trouble = await asyncio.to_thread(self._write, bench)
             self._kept = weakref.ref(bench)
-        reported, self._reported = self._reported, (self._trouble, self._path)
-        if self._trouble and reported != self._reported:  # once per model, not at every change
+        reported, self._reported = self._reported, (self._trouble, self._work)
+        told = bool(self._trouble) and reported != self._reported  # once per model, not at every change
+        if told:
             self._session.add_problem(f"this work cannot be kept for after a crash: {self._trouble}; Save > Project keeps it")
+        if told or released != self.released:
             self._session.notify()
 
     def _write(self, bench: Bench) -> str:
         """Write a bench; returns why that failed, or ""."""
         try:
-            if bench.model is not None and bench.model.path != self._path:  # another model: the previous one's save stays
+            if _identity(bench) != self._work:  # another model, or none: the previous one's save stays
                 self._release()
-                self._path = bench.model.path
+                self._work = _identity(bench)
+            if bench.model is None:
+                return ""
             if self._folder is None:
                 self._folder = new_folder()
                 self._lock = lock_folder(self._folder)
@@ -139,3 +143,8 @@ class Keeping:
         except Exception as error:  # noqa: BLE001 - a bug becomes a sentence too, and the workbench continues
             return bug_in_words(error, sys.argv)
         return ""
+
+
+def _identity(bench: Bench) -> tuple[Path, int | None] | None:
+    """The file and the plate of the bench's model; None: there is none."""
+    return None if bench.model is None else (bench.model.path, bench.model.plate)

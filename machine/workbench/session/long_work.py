@@ -1,5 +1,6 @@
 """Long tasks: the search for parts, the prices of a front, the slices, and the comparison with the model in one piece."""
 
+import asyncio
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from mdp.search.plan_file import planned_parts
 from profiles.errors import PlanError, UserError
 from profiles.frozen import Vector
 
+REST_S = 0.3  # pause in changes of a bench after which it is priced; an interrupted pricing costs a process
 ENDED = "slicing was stopped, for the model on the workbench has changed: slice it again"
 
 
@@ -70,20 +72,20 @@ def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
 
     async def price(bench: Bench) -> dict[int, FrontRow]:
         prices: dict[int, FrontRow] = {}
+        await asyncio.sleep(REST_S)
         for row in rows_to_price(bench):
-            if not prices_now.stale:
-                with suppress(UserError):  # the row then has no price
-                    prices[row] = await session.long.run(price_row, bench, row)
+            with suppress(UserError):  # the row then has no price
+                prices[row] = await session.long.run(price_row, bench, row)
         return prices
 
     def accept(prices: dict[int, FrontRow]) -> None:
         now = replace(session.history.now, bench=with_prices(session.bench, prices))
         session.become(replace(session.history, now=now))
 
-    prices_now = Derived(
-        session, lambda bench: None if bench.priced else (bench.sought, bench.rows, bench.locked), price, accept=accept
-    )
-    return prices_now
+    def decides(bench: Bench) -> tuple[object, ...] | None:
+        return None if bench.priced else (bench.sought, bench.rows, bench.locked)
+
+    return Derived(session, decides, price, interrupts=True, accept=accept)
 
 
 def price_by_hand(session: SessionBase) -> Derived[FrontRow | None]:
@@ -94,11 +96,12 @@ def price_by_hand(session: SessionBase) -> Derived[FrontRow | None]:
         return None if is_found or not bench.rows else (bench.sought, bench.cuts, bench.locked)
 
     async def price(bench: Bench) -> FrontRow | None:
+        await asyncio.sleep(REST_S)
         with suppress(UserError):
             return await session.long.run(price_cuts, bench)
         return None
 
-    return Derived(session, decides, price)
+    return Derived(session, decides, price, interrupts=True)
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,13 +165,12 @@ class Slicing(Derived[Slices]):
             walls.update(so_far.walls)
             tell(replace(so_far, walls=walls))
 
-        files = self._session.others_of(bench), self._session.new_file(), self._session.new_file()
-        sliced = await self._session.long.run(slice_bench, bench, *files, tell=follow)
+        page, gcode = self._session.new_file(), self._session.new_file()
+        with self._session.cutting_others() as others:
+            sliced = await self._session.long.run(slice_bench, bench, others, page, gcode, tell=follow)
         if self.done is not None:
             self.done.sliced.page.unlink(missing_ok=True)
             self.done.sliced.gcode.unlink(missing_ok=True)
-        if bench.beside:
-            self._session.become(self._session.history)  # the other models stand as they are cut now
         return Slices(bench, number, sliced, walls)
 
 
@@ -180,10 +182,14 @@ class Comparing(Derived[tuple[Alternative, ...]]):
         super().__init__(
             session,
             lambda bench: None if (slices := slicing.latest()) is None else slices.bench.printed,
-            lambda bench: session.long.run(compare_bench, bench, session.others_of(bench), tell=self.teller()),
+            self._compare,
             by_itself=False,
             interrupts=True,
         )
+
+    async def _compare(self, bench: Bench) -> tuple[Alternative, ...]:
+        with self._session.cutting_others() as others:
+            return await self._session.long.run(compare_bench, bench, others, tell=self.teller())
 
     def rows(self) -> tuple[Alternative, ...]:
         """The last slices, then their model in one piece; () if these slices have not been compared."""

@@ -16,6 +16,7 @@ from machine.workbench.bench.bench import (
     Bench,
     History,
     Step,
+    check_first_plate,
     emptied,
     with_beside,
     with_model,
@@ -24,7 +25,6 @@ from machine.workbench.bench.bench import (
     with_prices,
     with_profile,
     with_rotation,
-    with_rows,
     with_scaled_model,
 )
 from machine.workbench.bench.model import Model
@@ -96,7 +96,7 @@ class Session(SessionBase):
         self.closed = True
         for task in self._tasks:
             task.cancel()
-        for tasks in (self.quick, self.long, self.hand):
+        for tasks in (self.quick, self.long, self.hand, self.aside):
             tasks.close()
         self.notify()
         trouble = await self.keeping.finish()
@@ -134,20 +134,19 @@ class Session(SessionBase):
     def addable(self) -> str:
         """Name of the model that has just been opened over another one, beside which it can be put; "" if there is none."""
         model = None if self._opened is None else self.bench.model
-        return "" if model is None else model.name
+        return "" if model is None or model.plate is not None else model.name
 
     async def add_opened(self) -> None:
         """Put the model that has just been opened beside the previous one, and that on the bench again. Raises UserError."""
         model = self.bench.model
         if self._opened is None or model is None:
             raise PlanError("no model has just been opened over another one, so none can be put beside that")
-        await self._add(self._opened[0], model.path, model.name)
+        check_first_plate(model)
+        await self.add_model(model.path, model.name, self._opened[0])
 
-    async def add_model(self, path: Path, name: str) -> None:
-        """Put the model of a file on the plate, beside that on the bench. Raises UserError."""
-        await self._add(self.bench, path, name)
-
-    async def _add(self, bench: Bench, path: Path, name: str) -> None:
+    async def add_model(self, path: Path, name: str, bench: Bench | None = None) -> None:
+        """Put the model of a file on the plate, beside that on the bench, None: the present one. Raises UserError."""
+        bench = bench or self.bench
         with self.waiting(f"reading {name}"):
             model = await self._read(path, name, bench.profile)
         self.do(f"add {name} to the plate", with_beside(bench, (*bench.beside, (model, 1))))
@@ -192,7 +191,10 @@ class Session(SessionBase):
             numbers = [] if model is None else [*map(str, model.plates)]
             allowed = f"one of {', '.join(numbers)} is expected" if numbers else "the model has no plates"
             raise PlanError(f"plate is {plate}: {allowed}")
-        await self.open_model(model.path, model.name, anew=False, plate=plate)
+        opened = self._opened
+        first = next(iter(model.plates))
+        await self.open_model(model.path, model.name, anew=False, plate=None if plate == first else plate)
+        self._opened = None if opened is None else (opened[0], self.bench)
 
     async def take_settings_inside(self) -> None:
         """Use the settings inside the slicer file on the bench; earlier changes stay where it has no value.
@@ -210,9 +212,11 @@ class Session(SessionBase):
         if not name.startswith("demo:"):
             raise PlanError(f"{name}: only the models that ship with the program are opened by name; choose or drop a file")
         before = self.bench
-        await self.open_model(locate(name), name)
+        await self.open_model(await self._copy_of(name, None), name)
         if (plan := plan_beside(name)) is not None:
+            opened = self.note
             await self.open_plan(plan)
+            self.add_note(opened)
         self._opened = (before, self.bench) if before.model is not None else None
 
     async def open_project(
@@ -258,11 +262,10 @@ class Session(SessionBase):
         return with_prices(replace(bench, recommended=project.recommended), {}) if bench.rows else bench
 
     async def _copy_of(self, name: str, model: Path | None) -> Path:
-        """A copy of a project's model file for the bench, or the file of a demo."""
-        if model is None:
-            return locate(name)
-        path = self.received.new_file(name)
-        await asyncio.to_thread(shutil.copyfile, model, path)
+        """A copy of a project's model file, or that of a demo, for this opening alone: work is saved by its model's file."""
+        source = locate(name) if model is None else model
+        path = self.received.new_file(name if model is not None else source.name)
+        await asyncio.to_thread(shutil.copyfile, source, path)
         return path
 
     async def open_plan(self, path: Path) -> None:
@@ -352,7 +355,7 @@ class Session(SessionBase):
         effect = effect_of_change(before.profile, bench.profile)
         if effect == Effect.REACH and bench.rows:
             rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).rejected]
-            bench = with_rows(bench, rows)
+            bench = replace(bench, rows=tuple(rows), recommended=bench.recommended if rows else 0)
         if bench.cuts is None or effect < Effect.REACH:
             return bench, ""
         bench, removed = await self.trials.without_invalid(bench)

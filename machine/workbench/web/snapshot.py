@@ -14,7 +14,7 @@ from machine.program import Alternative
 from machine.quantities import about, duration, filament_g, newtons, percent, price_in_words
 from machine.view.parts import front_record, page_colours
 from machine.view.scene import machine_bodies
-from machine.workbench.bench.bench import Bench, Step
+from machine.workbench.bench.bench import Bench, History, Step
 from machine.workbench.bench.changes import Cuts
 from machine.workbench.bench.model import Model
 from machine.workbench.bench.page_words import page_words
@@ -155,10 +155,7 @@ def _gcode(session: Session) -> dict[str, Any] | None:
 
 def snapshot(session: Session) -> dict[str, Any]:
     """Everything but the triangles; small enough to be sent as a whole at every change."""
-    bench, history, search = session.bench, session.history, session.finding.progress
-    standing = session.standing.result
-    best = None if search is None else search.best
-    planes = [] if best is None else [plane_values(plane) for plane in reversed(best.planes)]
+    bench = session.bench
     return {
         "version": session.version,
         "problem": session.problem,
@@ -169,10 +166,34 @@ def snapshot(session: Session) -> dict[str, Any]:
         "preparing": bool(session.readiness.progress),
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "savable": _savable(session),
-        "undo": terminal_words(history.now.word) if history.before else "",
-        "redo": terminal_words(history.undone[-1].word) if history.undone else "",
-        "steps": {"undo": _words((*history.before, history.now)[1:]), "redo": _words(history.undone)},
+        **_steps(session.history),
+        **_model_state(session),
+        **_parts_state(session),
+        **_marks_state(bench),
+        **_plate_state(session),
+        **slices_state(session),
+        "gcode": _gcode(session),
+        "given": asdict(bench.given),
+        "material": bench.profile.material.name,
+        "process": bench.profile.process.name,
+        "machine": machine_bodies(bench.profile.machine, known=True),
+        "benches": session.benches,
+        "kept": session.keeping.released,
+    }
+
+
+def _steps(history: History) -> dict[str, Any]:
+    """The steps that can be undone and redone."""
+    undo, redo = (_words(steps) for steps in ((*history.before, history.now)[1:], history.undone))
+    return {"undo": undo[0] if undo else "", "redo": redo[0] if redo else "", "steps": {"undo": undo, "redo": redo}}
+
+
+def _model_state(session: Session) -> dict[str, Any]:
+    """The model and its placement."""
+    bench, standing = session.bench, session.standing.result
+    return {
         "model": None if bench.model is None else _model(bench.model, session),
+        "units": _units(session),
         "rotation": bench.rotation,
         "scale": bench.profile.process.scale,
         "standing": standing and {"size_mm": standing.size_mm, "problem": standing.problem},
@@ -183,40 +204,46 @@ def snapshot(session: Session) -> dict[str, Any]:
         "limit": threshold(bench.profile.process.self_supporting_angle_deg),
         "platform_mm": PLATE_TOLERANCE_MM,
         "resting": _resting(session),
+    }
+
+
+def _parts_state(session: Session) -> dict[str, Any]:
+    """The search, its front, and the planes on the bench."""
+    bench, search = session.bench, session.finding.progress
+    best = None if search is None else search.best
+    planes = [] if best is None else [plane_values(plane) for plane in reversed(best.planes)]
+    return {
         "search": None if search is None else {"text": search.text, "planes": planes},
-        **slices_state(session),
-        "gcode": _gcode(session),
         "front": [front_record(row) for row in bench.rows],
         "by_hand": session.by_hand.result and front_record(session.by_hand.result),
+        "priced": bench.priced,
+        "notes": [note for note in bench.notes if bench.rows and advice("parts", bench.parts) not in note],
+        "laid": _laid(session),
         "parts": bench.parts,
         "recommended": bench.recommended,
         "cuts": _cuts(bench.cuts or ()),
         "locked": [part in bench.locked for part in bench.cuts or ()],
         "trial": _trial(session),
-        "zones": _zones(bench),
-        "modifiers": [_modifier(modifier) for modifier in bench.zones.modifiers],
-        "marks": marks_key(bench),
         "refused": _refused(session),
-        "units": _units(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),
-        "notes": [note for note in bench.notes if bench.rows and advice("parts", bench.parts) not in note],
-        "laid": _laid(session),
-        "given": asdict(bench.given),
         "part_settings": [{"part": own.part, "keys": list(own.process)} for own in bench.profile.parts],
-        "priced": bench.priced,
-        "stops": [_stop(stop) for stop in bench.stops],
+    }
+
+
+def _plate_state(session: Session) -> dict[str, Any]:
+    """All models on the plate, where they stand, and the pauses of their print."""
+    bench, standing = session.bench, session.standing.result
+    count = bench.copies + sum(copies for _, copies in bench.beside)
+    told = "" if standing is None or count == 1 else standing.copies_problem or f"All {count} stand on the plate."
+    return {
+        "place_mm": bench.profile.process.place_mm,
         "copies": bench.copies,
         "copies_mm": standing and [[round(x, 3), round(y, 3)] for x, y in standing.copies_mm],
-        "copies_told": _copies_told(session),
+        "copies_told": told,
         "beside": [{"name": other.name, "copies": copies} for other, copies in bench.beside],
         "others": standing and standing.others_key,
         "addable": session.addable,
-        "place_mm": bench.profile.process.place_mm,
-        "machine": machine_bodies(bench.profile.machine, known=True),
-        "benches": session.benches,
-        "kept": session.keeping.released,
-        "material": bench.profile.material.name,
-        "process": bench.profile.process.name,
+        "stops": [_stop(stop) for stop in bench.stops],
     }
 
 
@@ -259,17 +286,8 @@ def _words(steps: Sequence[Step]) -> list[str]:
 
 
 def _stop(stop: Stop) -> dict[str, str]:
-    """A pause in words."""
     where = f"at {stop.height_mm or 0.0:.12g} mm" if stop.layer is None else f"before layer {stop.layer}"
     return {"kind": "filament change" if stop.change else "pause", "where": f"part {stop.part}, {where}"}
-
-
-def _copies_told(session: Session) -> str:
-    """Sentence about how many models are on the plate, or why they do not fit."""
-    standing, count = session.standing.result, session.bench.copies + sum(copies for _, copies in session.bench.beside)
-    if standing is None or count == 1:
-        return ""
-    return standing.copies_problem or f"All {count} stand on the plate."
 
 
 def marks_key(bench: Bench) -> str:
@@ -280,13 +298,14 @@ def marks_key(bench: Bench) -> str:
     return sha256(repr((bench.model.key, bench.rotation, kinds)).encode()).hexdigest()[:16]
 
 
-def _zones(bench: Bench) -> list[dict[str, Any]]:
+def _marks_state(bench: Bench) -> dict[str, Any]:
     """The zones as the page shows them: a mesh by the box around it, brushed faces by their count alone."""
-    return [
+    zones = [
         {"kind": kind, "number": number, **_zone(zone)}
         for kind in ZONE_KINDS
         for number, zone in enumerate(getattr(bench.zones, kind), start=1)
     ]
+    return {"zones": zones, "modifiers": [_modifier(modifier) for modifier in bench.zones.modifiers], "marks": marks_key(bench)}
 
 
 def _zone(zone: AnyZone) -> dict[str, Any]:

@@ -14,17 +14,20 @@ from starlette.requests import Request
 from starlette.responses import JSONResponse, Response
 
 from machine.pipeline.project import Project, is_project, read_folder
+from machine.pipeline.project_record import RECORD
 from machine.pipeline.requests import GCODE_SUFFIXES, Given
 from machine.workbench.access.limits import DEVICE, check_model_name, check_plan, check_profile
 from machine.workbench.bench.values import with_value
 from machine.workbench.session.keeping import OPEN_ELSEWHERE
 from machine.workbench.session.session import Session
+from machine.workbench.work.cutting import draw_kept
 from machine.workbench.work.folders import Received, folders_kept, remove_file
-from profiles.errors import PlanError, ProfileError, reason
-from profiles.files import lock_folder, remove_locked
+from profiles.errors import PlanError, ProfileError, UserError, reason
+from profiles.files import lock_folder, modified_s, remove_locked
 from profiles.messages import check_text, option
 from profiles.places import KINDS, kind_in
 
+PICTURE = "picture.png"  # in the folder of kept work
 TEXT_SUFFIX = ".toml"  # of plans and profiles
 MIB = 2**20
 
@@ -84,7 +87,6 @@ class Uploads:
         return await self._open(session, path.name, copy_to)
 
     async def remove_left(self, session: Session, request: Request) -> Response:
-        """Remove a file left behind."""
         await asyncio.to_thread(remove_file, self._left_file(request))
         return JSONResponse({})
 
@@ -101,14 +103,24 @@ class Uploads:
             try:
                 project = read_folder(folder)
             except PlanError:
-                rows.append({"key": folder.name, "name": "", "parts": 0, "written_s": folder.stat().st_mtime})
+                with suppress(FileNotFoundError):  # another page has removed it meanwhile
+                    rows.append({"key": folder.name, "name": "", "parts": 0, "written_s": modified_s(folder)})
             else:
                 name = ", ".join(project.names)
                 rows.append({"key": folder.name, "name": name, "parts": project.parts, "written_s": project.written_s})
         return JSONResponse(rows)
 
+    async def kept_picture(self, session: Session, request: Request) -> Response:
+        """The small picture of autosaved work, drawn when it is first requested after a change of the work."""
+        with suppress(UserError, OSError):  # without a picture a page shows the name alone
+            folder = _kept_folder(request)
+            picture = folder / PICTURE
+            if not picture.is_file() or modified_s(picture) < modified_s(folder / RECORD):
+                await session.aside.run(draw_kept, folder, picture)
+            return Response(await asyncio.to_thread(picture.read_bytes), media_type="image/png")
+        return Response("there is no picture of this work\n", 404)
+
     async def open_kept(self, session: Session, request: Request) -> Response:
-        """Open autosaved work on a bench."""
         folder = _kept_folder(request)
         project = read_folder(folder)
         word = f"open the work of {strftime('%H:%M', localtime(project.written_s))}"
@@ -120,9 +132,10 @@ class Uploads:
         return JSONResponse({})
 
     async def remove_kept(self, session: Session, request: Request) -> Response:
-        """Remove a folder of kept work."""
         folder = _kept_folder(request)
-        lock = lock_folder(folder)
+        lock = None
+        with suppress(FileNotFoundError):
+            lock = lock_folder(folder)
         if lock is None:
             raise PlanError(OPEN_ELSEWHERE)
         await asyncio.to_thread(remove_locked, folder, lock)

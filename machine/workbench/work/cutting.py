@@ -16,12 +16,12 @@ import numpy as np
 from machine.pipeline import compilers
 from machine.pipeline.choice import lies_freely, orientation_in_words, pricing, standing_in_words
 from machine.pipeline.given_plan import with_file_marks
-from machine.pipeline.pictures import contact_sheet, front_picture, parts_picture, parts_together, png_bytes
-from machine.pipeline.project import PICTURE_PX, project_bytes, with_meshes_beside
+from machine.pipeline.pictures import PLAIN, contact_sheet, front_picture, parts_picture, parts_together, png_bytes, small_picture
+from machine.pipeline.project import PICTURE_PX, STANDING, project_bytes, read_folder, with_meshes_beside
 from machine.planning.fit import check_parts
 from machine.planning.stops import check_stop_parts
 from machine.view.encoding import pack
-from machine.view.parts import page_colours
+from machine.view.parts import page_colours, part_colours
 from machine.view.scene import solids, surfaces
 from machine.workbench.bench.bench import Bench, locked_plan, plan_of_bench
 from machine.workbench.bench.changes import Cuts
@@ -33,16 +33,20 @@ from mdp.directions.orientation import set_on_plate
 from mdp.joint import flaw_of, joints_of
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats, Mesh
+from mdp.model_file import locate
 from mdp.plane import Plane
 from mdp.ranking.ranker import CLASSIC, ranker_named
+from mdp.read import read_model
 from mdp.save import FOLDER_FILES, glb, part_file, stl, threemf
 from mdp.search.orient import orient_and_decompose
 from mdp.search.plan_file import PlanFile, PlannedPart, plan_of, planned_parts
+from mdp.search.plan_reading import read_plan
 from mdp.search.plan_writing import plan_text
 from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.search.trial import Trial, Trials
 from mdp.zone import NO_ZONES
 from profiles.errors import MoveError, PlanError
+from profiles.files import write_whole
 from profiles.profile import Profile, load
 
 PLAN_NAME = "plan.toml"
@@ -144,7 +148,6 @@ def make_plan(tell: Tell, bench: Bench) -> str:
 
 
 def make_project(tell: Tell, bench: Bench, out: Path) -> None:
-    """Write the project file of the bench."""
     decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     check_stop_parts(bench.stops, len(decomposition.parts))
     compilers.wait_for(compilers.PICTURES)
@@ -228,6 +231,25 @@ def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:
     return ""
 
 
+def draw_kept(tell: Tell, folder: Path, out: Path) -> None:
+    """Write the small picture of autosaved work: its parts, or its model if that is not cut. Raises UserError."""
+    project = read_folder(folder)
+    given, name = project.given, project.name
+    profile = load(given.machine, given.material, given.process, given.settings)
+    file, process = locate(name) if project.model is None else project.model, profile.process
+    turned = None if project.rotation == STANDING else np.array(project.rotation)
+    mesh = set_on_plate(read_model(file, process.scale, process.rotate_deg, project.plate).mesh, turned)
+    meshes, colours = [mesh], [PLAIN]
+    if project.plan is not None and project.parts > 1:
+        compilers.wait_for(compilers.JUDGE)
+        plan = replace(read_plan(project.plan), front=())
+        meshes = [part.mesh for part in cut_by_plan(mesh, name, profile, SearchRequest(plan=plan)).parts]
+        colours = [(r, g, b) for r, g, b in part_colours(len(meshes)).tolist()]
+    compilers.wait_for(compilers.PICTURES)
+    with suppress(OSError):  # another page removes the work meanwhile
+        write_whole(out, small_picture(meshes, colours))
+
+
 def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
     """Write the pictures of `--png`, `--sheet` and `--front` for the bench's parts as a zip file."""
     decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME), prices=True)
@@ -241,7 +263,6 @@ def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
 
 
 def make_ready(tell: Tell, number: int, bench: Bench) -> None:
-    """Prepare the bench with this number for planes."""
     _trials(number, bench)
 
 

@@ -90,8 +90,12 @@ def tidy_left() -> tuple[Path, ...]:
 
 def files_in(*folders: Path) -> list[Path]:
     """The files in the folders of several Received, newest first."""
-    files = [path for folder in folders for path in folder.glob("*/*") if path.is_file()]
-    return sorted(files, key=lambda path: (path.stat().st_mtime, path), reverse=True)
+    dates = dict[Path, float]()
+    for path in (path for folder in folders for path in folder.glob("*/*")):
+        with suppress(FileNotFoundError):
+            if path.is_file():
+                dates[path] = modified_s(path)
+    return sorted(dates, key=lambda path: (dates[path], path), reverse=True)
 
 
 def _is_begun(folder: Path) -> bool:

@@ -1,7 +1,8 @@
 """Print history: what the list of past prints has of prints that ended, failed, were killed or go on."""
 
 import json
-import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,15 +12,15 @@ from machine.dryrun.dryrun import dry_run
 from machine.link.print_state import PrintState
 from machine.pipeline.programs import LoadedProgram
 from machine.printing import history
-from machine.printing.history import FILE, MOST_BYTES, MOST_PRINTS, past_prints, recorded
+from machine.printing.history import FOLDER, MOST_PRINTS, past_prints, recorded
 from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, End
 from machine.program import Program
 from profiles.errors import PrinterError
+from profiles.files import lock
 from profiles.folders import state_folder
 from profiles.profile import load
 
 LINES = ("G21", "G90", "M83", "G1 X1 E1500 F600", "G1 X2 E500")
-NO_PID = 2**22 + 1  # above the largest number of a process on Linux
 
 
 @pytest.fixture(autouse=True)
@@ -31,8 +32,8 @@ def times(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[float]:
     return told
 
 
-def file() -> Path:
-    return state_folder() / FILE
+def folder() -> Path:
+    return state_folder() / FOLDER
 
 
 def printed(name: str, act: Callable[[], End]) -> End:
@@ -64,19 +65,45 @@ def test_a_print_that_goes_on_is_not_listed_and_one_that_was_killed_has_failed()
         return End(PrintState.LEFT)
 
     printed("vase", act)
-    file().write_text(json.dumps({"key": "a", "pid": NO_PID, "name": "killed", "port": "sim", "begun": 1.0}) + "\n")
+    (file,) = folder().iterdir()
+    file.write_text(json.dumps({"name": "killed", "port": "sim", "begun": 1.0}) + "\n")
     assert [(past["name"], past["outcome"], past["seconds"]) for past in past_prints()] == [("killed", "failed", None)]
 
 
-def test_damaged_lines_are_left_out_and_a_large_file_keeps_the_newest_prints() -> None:
-    ended = {"pid": os.getpid(), "name": "old", "port": "sim", "begun": 1.0, "ended": 2.0, "outcome": "done"}
-    damaged = ['{"key": ', "[]", '{"key": 1}', '{"key": "b"}', '{"key": "c", "name": "x", "port": "", "begun": "a", "ended": 1}']
-    many = MOST_BYTES // 100
-    file().write_text("\n".join([*damaged, *(json.dumps({"key": f"{k}", **ended}) for k in range(many))]) + "\n")
-    assert len(past_prints()) == MOST_PRINTS
+def test_a_print_of_another_process_goes_on_until_that_ends(tmp_path: Path) -> None:
+    program = """
+from machine.link.print_state import PrintState
+from machine.printing import history
+file = history._new_file()
+history._write(file, {"name": "vase", "port": "sim", "begun": 1.0})
+print(flush=True)
+input()
+"""
+    with subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        assert past_prints() == []
+        process.kill()
+    assert [past["outcome"] for past in past_prints()] == ["failed"]
+
+
+def test_damaged_files_are_left_out_and_the_newest_prints_are_kept_and_those_that_go_on() -> None:
     printed("new", lambda: DONE)
-    assert file().stat().st_size < MOST_BYTES
-    assert [past["name"] for past in past_prints()][:2] == ["new", "old"]
+    ended = json.dumps({"name": "old", "port": "sim", "begun": 1.0, "ended": 2.0, "outcome": "done"})
+    for number in range(MOST_PRINTS + 9):
+        (folder() / f"1999-{number:03}.json").write_text(ended)
+    with (folder() / "1999-000.json").open("ab") as goes_on:
+        lock(goes_on.fileno())
+        printed("newer", lambda: DONE)
+        assert (folder() / "1999-000.json").exists()
+    for number, text in enumerate(['{"name": ', "[]", "1", '{"name": "x", "port": "", "begun": "a", "ended": 1}', "\0"]):
+        (folder() / f"2000-{number}.json").write_text(text)
+    assert [past["name"] for past in past_prints()] == ["newer", "new", *["old"] * (MOST_PRINTS - 1)]
+
+
+def test_a_declined_print_takes_no_place_in_the_history() -> None:
+    printed("unwanted", lambda: NOT_BEGUN)
+    assert list(folder().iterdir()) == []
 
 
 def test_a_print_is_not_held_up_where_nothing_can_be_written(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -21,7 +21,9 @@ from machine.pipeline.project_record import RECORD, VERSION
 from machine.pipeline.requests import Given
 from machine.planning.stops import parse_stops
 from machine.workbench.bench.bench import Bench
+from machine.workbench.bench.model import Model
 from machine.workbench.session import keeping
+from machine.workbench.session.commands import undo
 from machine.workbench.session.keeping import Keeping
 from machine.workbench.session.session import Session
 from machine.workbench.work import folders as kept_work
@@ -38,6 +40,7 @@ from machine.workbench.work.folders import (
     write_work,
 )
 from machine.workbench.work.worker_pool import WorkerPools
+from mdp.model_file import locate
 from mdp.save import stl
 from mdp.search.plan_file import PlannedPart
 from mdp.search.plan_reading import read_plan
@@ -237,6 +240,54 @@ def test_kept_work_is_opened_on_one_bench_at_a_time(bench: Bench) -> None:
 
     asyncio.run(open_twice())
     assert folders_kept() == [folder]
+
+
+@pytest.mark.parametrize("before", ["demo:bracket", "", "tee.stl"])
+def test_earlier_work_that_was_opened_is_there_as_it_was_after_undo(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, before: str, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(keeping, "AFTER_S", 0.0)
+    folder = new_folder()
+    write_work(folder, Bench(load(), replace(model("demo:bracket"), path=locate("demo:bracket")), copies=3))
+
+    async def open_and_undo() -> int:
+        session = Session(load(), Given(), WorkerPools())
+        session._read = read  # type: ignore[method-assign]
+        if before.startswith("demo:"):
+            await session.open_demo(name=before)
+        elif before:
+            await session.open_model(tmp_path / "tee.stl", before)
+        await session.open_folder(folder, read_folder(folder), "open it")
+        assert folders_kept() == []
+        await _settled(session.keeping)
+        version = session.keeping.released
+        undo(session)
+        await _settled(session.keeping)
+        assert folders_kept() == [folder]
+        await session.close()
+        return session.keeping.released - version
+
+    async def read(path: Path, name: str, *given: object, **more: object) -> Model:
+        return replace(model(name), path=path)
+
+    (tmp_path / "tee.stl").write_bytes(stl(tee()))
+    assert asyncio.run(open_and_undo()) > 0
+    assert read_folder(folder).copies == 3
+
+
+def test_a_folder_that_goes_while_earlier_work_is_listed_is_left_out(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+    stays, goes = new_folder(), new_folder()
+    for folder in (stays, goes):
+        write_work(folder, bench)
+
+    def locked(folder: Path) -> int | None:
+        lock = lock_folder(folder)
+        if folder == goes:
+            shutil.rmtree(goes)
+        return lock
+
+    monkeypatch.setattr(kept_work, "lock_folder", locked)
+    assert folders_kept() == [stays]
 
 
 def test_kept_work_is_listed_where_the_system_has_no_locks_and_no_files_of_other_programs_are_touched(

@@ -183,6 +183,7 @@ def test_after_any_commands_the_plan_is_read_again_as_it_is_and_undo_and_redo_le
     seed: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("machine.workbench.session.planes.CHANGING_S", 0.0)
+    monkeypatch.setattr("machine.workbench.session.long_work.REST_S", 0.0)
     (tmp_path / "tee.stl").write_bytes(stl(tee()))
     (tmp_path / "mine.toml").write_text('inherits = "open5x_jubilee"\n[machine]\nname = "mine"\n')
 

@@ -6,7 +6,6 @@ import signal
 import socket
 import time
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from shlex import split
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import manifold3d as m3
 import numpy as np
 import pytest
+from PIL import Image
 from websockets.exceptions import InvalidStatus
 
 from machine.cli.cli import main
@@ -23,18 +23,6 @@ from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, prusaslicer
 from tests.shapes import box, tee
 
 FOUND = ("front", "recommended", "cuts")
-
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Running]:
-    with workbench(*QUICK) as running:
-        yield running
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def test_the_page_is_below_the_token_alone_and_keeps_to_itself(bench: Running) -> None:
@@ -379,6 +367,13 @@ def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbi
         page.do("undo")
 
 
+def colours_in(picture: bytes) -> set[str]:
+    """Which of the first two parts a picture shows."""
+    pixels = np.array(Image.open(io.BytesIO(picture)).convert("RGBA"), dtype=int).reshape(-1, 4)
+    red, _, blue = pixels[pixels[:, 3] > 200, :3].T
+    return {name for name, more in (("orange", red - blue), ("blue", blue - red)) if (more > 60).any()}
+
+
 def test_work_by_hand_is_put_away_when_another_model_is_opened_and_lies_there_as_it_was_when_it_is_opened_again(
     bench: Running, folder: Path
 ) -> None:
@@ -407,6 +402,11 @@ def test_work_by_hand_is_put_away_when_another_model_is_opened_and_lies_there_as
         page.do("redo")
         page.until(lambda state: name_of(state) == "next.stl")
         (work,) = [work for work in kept() if work["parts"] == 2][-1:]
+        for _ in range(2):  # drawn, then as it was drawn
+            status, picture = bench.ask(f"kept/{work['key']}/picture")
+            assert (status, colours_in(picture)) == (200, {"orange", "blue"})
+            assert len(picture) < 20_000
+        assert bench.ask("kept/nothing/picture")[0] == 404
         assert bench.ask(f"kept/{work['key']}", "POST", Origin=origin)[0] == 200
         again = page.until(lambda state: name_of(state) == "own.stl")
         assert {key: again[key] for key in FOUND} == {key: searched[key] for key in FOUND}

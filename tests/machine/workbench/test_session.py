@@ -13,18 +13,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.pipeline.requests import Given
-from machine.workbench.bench.bench import Bench, with_front, with_profile
+from machine.workbench.bench.bench import Bench, with_beside, with_cuts, with_front, with_profile
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import obey, redo, undo
 from machine.workbench.session.session import Session, Workbench
 from machine.workbench.web.snapshot import snapshot
 from machine.workbench.work.cutting import Found, Searched
 from machine.workbench.work.models import Standing
-from machine.workbench.work.worker_pool import WorkerPools
+from machine.workbench.work.worker_pool import TaskQueue, WorkerPools
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Trial
+from profiles.errors import PlanError
 from profiles.messages import advice, option
 from profiles.profile import Profile, load
 from tests.machine.workbench.models import model
@@ -40,6 +41,7 @@ EDIT = st.fixed_dictionaries({
 def _nobody_waits(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("machine.workbench.session.planes.CHANGING_S", 0.0)
     monkeypatch.setattr("machine.workbench.session.planes.REST_S", 0.0)
+    monkeypatch.setattr("machine.workbench.session.long_work.REST_S", 0.0)
 
 
 def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
@@ -513,6 +515,134 @@ def test_prices_go_on_while_the_bench_changes_in_what_does_not_decide_them_and_a
     bench = when_done(work).bench
     assert (priced, bench.priced, bench.copies) == ([0, 1], True, 3)
     assert with_front(replace(bench, priced=False), rows).priced
+
+
+def reading_plates(session: Session) -> None:
+    """Have it read files of two plates, and measure no plan."""
+
+    async def read(task: Any, *given: Any, **more: Any) -> Any:
+        if task.__name__ != "read_model":
+            return ()
+        path, name, _, _, plate = given
+        return replace(model(name), path=path, plates={1: "", 2: ""}, plate=plate)
+
+    session.quick.run = read  # type: ignore[method-assign]
+
+
+def test_the_first_plate_of_a_file_can_be_added_instead_also_after_another_one_was_looked_at() -> None:
+    offered: list[str] = []
+
+    async def work(session: Session) -> None:
+        reading_plates(session)
+        await session.open_model(Path("b.3mf"), "b.3mf")
+        for plate in (2, 1):
+            await session.open_plate(plate=plate)
+            offered.append(session.addable)
+            if not session.addable:
+                with pytest.raises(PlanError, match=r"plate 2 of b\.3mf is open: only the first plate"):
+                    await session.add_opened()
+        await session.add_opened()
+
+    bench = when_done(work).bench
+    assert offered == ["", "b.3mf"]
+    assert bench.model is not None
+    assert (bench.model.name, [other.name for other, _ in bench.beside]) == ("a", ["b.3mf"])
+
+
+def test_a_demo_that_is_cut_by_its_plan_says_too_that_the_work_before_it_is_kept(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
+
+    async def work(session: Session) -> None:
+        reading_plates(session)
+        (tmp_path / "a.stl").write_bytes(b"solid")
+        session.do("copies", replace(session.bench, model=replace(model("a"), path=tmp_path / "a.stl"), copies=2))
+        await session.open_demo(name="demo:calibration")
+
+    session = when_done(work)
+    assert (session.bench.parts > 1, session.note) == (True, "a is kept under Earlier work (Undo brings it back)")
+
+
+@pytest.mark.parametrize(("task", "priced"), [("price_cuts", True), ("price_row", False)])
+def test_slices_do_not_wait_for_prices_of_planes_or_settings_that_have_changed_since(
+    task: str, priced: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    begun: list[str] = []
+
+    async def work(session: Session) -> None:
+        async def ask(do: Any, task: Any, *given: Any, tell: Any) -> Any:
+            begun.append(task.__name__)
+            await asyncio.sleep(60.0 if task.__name__.startswith("price") else 0.0)
+            return None, ""
+
+        session.long._ask, session.long.run = ask, partial(TaskQueue.run, session.long)  # type: ignore[assignment, method-assign]
+        for offset_mm in (6.0, 7.0):
+            row = FrontRow((Plane(np.array(UP), offset_mm + 3.0),), 1.0, 2.0, 3.0, chosen=True)
+            found = replace(with_front(session.bench, (row,)), priced=priced)
+            session.do("move a plane", with_cuts(found, (PlannedPart(UP, offset_mm),)) if priced else found)
+            for _ in range(5):
+                await asyncio.sleep(0)
+            monkeypatch.setattr("machine.workbench.session.long_work.REST_S", 60.0)  # the second pricing has not begun
+        obey(session, {"do": "slice"})
+        for _ in range(5):
+            await asyncio.sleep(0)
+        assert begun == [task, "slice_bench"]
+        session.by_hand.stop()
+        session._prices.stop()
+
+    when_done(work)
+
+
+def test_the_other_models_stay_in_the_picture_while_a_task_cuts_them_and_are_placed_anew_once_it_has() -> None:
+    stood: list[bool] = []
+
+    async def work(session: Session) -> None:
+        async def cut(task: Any, bench: Bench, others: Path, *given: Any, **more: Any) -> Any:
+            others.write_bytes(b"the parts of the other models")
+            session.notify()
+            stood.append(session.standing.result is not None)
+            await asyncio.sleep(0)
+            return ()
+
+        session.long.run = cut  # type: ignore[assignment, method-assign]
+        session.do("add b", with_beside(session.bench, ((model("b"), 1),)))
+        await settled(session)
+        before = session.standing.number
+        obey(session, {"do": "slice"})
+        await settled(session)
+        obey(session, {"do": "compare"})
+        await settled(session)
+        stood.append(session.standing.number == before + 2)
+
+    when_done(work)
+    assert stood == [True, True, True]
+
+
+def test_a_trial_on_another_bench_does_not_have_the_present_one_prepared_again() -> None:
+    async def work(session: Session) -> None:
+        await settled(session)
+        before = session.readiness.number
+        await session.trials.attempt(replace(session.bench, model=model("b")), ())
+        session.do("copies", replace(session.bench, copies=2))
+        await settled(session)
+        prepared.append(session.readiness.number - before)
+
+    prepared: list[int] = []
+    when_done(work)
+    assert prepared == [0]
+
+
+def test_a_model_chosen_in_one_piece_stays_so_when_a_setting_changes() -> None:
+    rows = (FrontRow((), 9.0, 0.0, 9.0), FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0, chosen=True))
+
+    async def work(session: Session) -> None:
+        session.do("find", with_front(session.bench, rows))
+        obey(session, {"do": "take", "parts": 1})
+        obey(session, {"do": "set", "key": "process.place_mm", "value": "[20, 0]"})
+
+    bench = when_done(work).bench
+    assert (bench.cuts, bench.profile.process.place_mm) == ((), (20.0, 0.0))
 
 
 @pytest.mark.parametrize("key", ["", "=:", "walls"])

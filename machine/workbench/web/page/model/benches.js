@@ -97,7 +97,7 @@ export async function offer(what) {
 /** Its buttons: it is opened, or removed; a refusal comes by the line. */
 function offerRow(what, one) {
   const name = one.name || "cannot be read here", words = OFFERS[what].wordsOf(one).join(", "), act = (method) => () => fetch(`${what}/${one.key}`, { method }).then(() => offer(what), () => {});
-  return made("li", {}, button("", act("POST"), {}, made("span", { text: name }), made("small", { text: words })), removeButton(`Remove ${name}, ${words}`, act("DELETE")));
+  return made("li", {}, button("", act("POST"), {}, ...(what === "kept" ? [made("img", { alt: "", loading: "lazy", src: `kept/${one.key}/picture` })] : []), made("span", { text: name }), made("small", { text: words })), removeButton(`Remove ${name}, ${words}`, act("DELETE")));
 }
 
 /** On this computer's page, where the workbench is open to the network: which devices are paired, each with a button that lets it go. */
