@@ -83,10 +83,11 @@ class Resumption:
         where += [f"layer {position.layer}"] if position.layer is not None else []
         letters = self.point.modal.axes.letters
         known = [f"{letter} {value:.3f}" for letter, value in zip(letters[:5], at[:5], strict=True) if value is not None]
-        torn = self.story.torn
+        torn, offset_mm = self.story.torn, self.story.last.z_offset_mm
         return (
             f"{self.name}, {', '.join([*where, f'line {self.point.line} of {len(self.lines)}'])}",
             f"surely executed: up to line {self.point.line - 1}" + (f", at {', '.join(known)}" if known else ""),
+            *([f"the tip was shifted by a Z offset of {offset_mm:+g} mm"] if offset_mm else []),
             *([f"{torn} of the journal's records could not be read: a power cut has torn them"] if torn else []),
             *([] if self.story.computer_ran_on else [RESTARTED]),
         )

@@ -206,8 +206,8 @@ def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal 
     if outcome.cancelled:
         heaters = f"{Heaters.HALTED.value}: {outcome.halted}" if outcome.halted else HEATERS[outcome.heaters_off]
         say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {heaters}")
-        if outcome.kept_offset:
-            say(outcome.kept_offset)
+        if outcome.kept:
+            say(outcome.kept)
         if journal is not None and journal.last.executed and not journal.trouble:
             say(f"tiltprint resume {journal.path} goes on with it")
         return CANCELLED

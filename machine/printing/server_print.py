@@ -107,23 +107,26 @@ class ServerPrinter:
         babystep = server.babystep or ("" if profile is None else dialect_of(profile.machine).babystep)
         with person.show(scene) as tell:
             tell(None)
+            follower = Follower(
+                server,
+                file,
+                progress.size,
+                on_status=lambda status, message: tell(progress.at(status, message)),
+                control=person.commands,
+                left=person.left,
+                running=running,
+                babystep=babystep,
+            )
             try:
-                state = Follower(
-                    server,
-                    file,
-                    progress.size,
-                    on_status=lambda status, message: tell(progress.at(status, message)),
-                    control=person.commands,
-                    left=person.left,
-                    running=running,
-                    babystep=babystep,
-                ).run()
+                state = follower.run()
             except KeyboardInterrupt:
                 say("ended at once: whether the print has been cancelled is not known, look at the printer")
                 raise
         file = file or name
         if state is PrintState.FAILED:
             raise FirmwareError(f"{STOPPED.format(server=server.name)}{progress.last_known}")
+        if follower.kept:
+            say(follower.kept)
         if state is PrintState.DONE:
             show(f"printed {file} on {server.name} in {duration(progress.elapsed_s)}\n")
             return DONE

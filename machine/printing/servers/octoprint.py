@@ -35,6 +35,7 @@ class OctoPrint(PrintServer):
     """An OctoPrint as a PrintServer."""
 
     key_header = "X-Api-Key"
+    hides_answers = True  # its REST API shows neither answers nor capabilities of the firmware
 
     def greet(self) -> Identity:
         """Its version; the API does not report the firmware."""

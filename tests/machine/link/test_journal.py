@@ -200,6 +200,12 @@ def test_a_state_has_the_word_in_the_file_that_it_always_had(state: PrintState, 
     assert read_journal(journal.path).last == at(20, state)
 
 
+def test_a_record_without_a_z_offset_reads_as_one_of_0_mm(tmp_path: Path) -> None:
+    offsets = [at(4), replace(at(5), z_offset_mm=-0.05)]
+    assert [read_journal(written(tmp_path / f"{k}", [moment])).last for k, moment in enumerate(offsets)] == offsets
+    assert b'"printing"]' in (tmp_path / "0").read_bytes()  # the record of earlier versions
+
+
 def test_a_record_with_a_state_that_no_print_has_is_damage(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", HEADING) as journal:
         journal.write(replace(at(20), state="dancing"))  # type: ignore[arg-type]

@@ -260,6 +260,66 @@ def test_a_z_offset_that_klipper_would_keep_for_the_next_print_is_taken_back(end
 
 
 @every_kind
+@pytest.mark.parametrize("end", [PrintState.DONE, PrintState.CANCELLED])
+def test_feed_and_flow_are_set_back_when_a_print_ends(kind: str, end: PrintState) -> None:
+    control = Control()
+    with printing(kind) as (job, server):
+        control.ask(Command.FEED, 150.0)
+        control.ask(Command.FLOW, 90.0)
+
+        def watch(status: PrintStatus, message: str) -> None:
+            if job.commands[-1:] == ["M221 S90"] and end is PrintState.CANCELLED:
+                control.ask(Command.CANCEL)
+            elif job.commands[-1:] == ["M221 S90"]:
+                job.steps = 1
+
+        assert run(server, control, watch) is end
+    overrides = [command for command in job.commands if command.startswith("M22")]
+    assert overrides == ["M220 S150", "M221 S90", "M220 S100", "M221 S100"]
+
+
+def test_a_print_that_is_left_still_needs_its_feed_and_the_end_says_so() -> None:
+    control = Control()
+    with printing("moonraker") as (job, server):
+        control.ask(Command.FEED, 150.0)
+        left = lambda: bool(job.commands)  # noqa: E731
+        follower = Follower(server, UPLOAD.name, 1, on_status=ignore, control=control, left=left)
+        assert follower.run() is PrintState.LEFT
+    assert job.commands == ["M220 S150"]
+    assert follower.kept == "the printer keeps the feed of 150 %: before another print send it M220 S100"
+
+
+def test_a_failed_print_tells_what_the_printer_keeps() -> None:
+    control = Control()
+    with printing("moonraker") as (job, server):
+        control.ask(Command.FEED, 150.0)
+
+        def watch(status: PrintStatus, message: str) -> None:
+            if job.commands:
+                job.state = "error"
+
+        with pytest.raises(ServerError, match="the printer keeps the feed of 150 %: before another print send it M220 S100"):
+            run(server, control, watch)
+
+
+def test_octoprint_does_not_say_whether_the_firmware_knows_a_z_offset() -> None:
+    control, messages = Control(), set[str]()
+    with printing("octoprint") as (job, server):
+        control.ask(Command.BABYSTEP, -0.01)
+
+        def watch(status: PrintStatus, message: str) -> None:
+            messages.add(message)
+            if message:
+                control.ask(Command.EMERGENCY_STOP)
+
+        left = lambda: False  # noqa: E731
+        Follower(server, UPLOAD.name, 1, on_status=watch, control=control, left=left, babystep="M290 Z{}").run()
+    assert [message.partition("(")[2] for message in messages if message.startswith("sent M290 Z-0.010, but ")] == [
+        "Marlin needs BABYSTEPPING): see that the tip moves"
+    ]
+
+
+@every_kind
 def test_a_z_offset_is_refused_where_the_firmware_is_not_known(kind: str) -> None:
     control, told = Control(), set[str]()
     with printing(kind) as (job, server):
