@@ -304,7 +304,7 @@ def test_a_failed_print_tells_what_the_printer_keeps() -> None:
 
 def test_octoprint_does_not_say_whether_the_firmware_knows_a_z_offset() -> None:
     control, messages = Control(), set[str]()
-    with printing("octoprint") as (job, server):
+    with printing("octoprint") as (_, server):
         control.ask(Command.BABYSTEP, -0.01)
 
         def watch(status: PrintStatus, message: str) -> None:
