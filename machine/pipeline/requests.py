@@ -95,6 +95,11 @@ class ModelRequest:
         return self.model if self.model.startswith("demo:") else Path(self.model).name
 
     @property
+    def models(self) -> tuple[str, ...]:
+        """The models of the plate, each once."""
+        return tuple(dict.fromkeys((self.model, *self.beside)))
+
+    @property
     def plan(self) -> Path | None:
         """The plan of a single model, or None."""
         return self.plans[0] if self.plans else None
