@@ -304,11 +304,12 @@ def save_profile(
     name: ProfileName,
     out: Annotated[Path, option("-o --out FILE.toml", "profile to write, for --machine and the like")],
     settings: options.Settings = (),
+    replace: requests.Replace = False,
 ) -> int:
     """Save a profile with your changes as your own. It contains the differences and inherits the rest."""
     from machine.cli.commands.profiles.listing import save
 
-    return save(name, settings, out)
+    return save(name, settings, out, replace)
 
 
 def import_(asked: requests.ImportRequest) -> int:

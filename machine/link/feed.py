@@ -347,7 +347,7 @@ class Feed:
         self._on_progress(
             PrintStatus(
                 sent=self.sent, acknowledged=done, total=self._total, elapsed_s=elapsed_s,
-                left_s=at.left_s(elapsed_s, feed_percent),
+                left_s=None if self.state is PrintState.CANCELLING else at.left_s(elapsed_s, feed_percent),
                 share=at.share(done, self._total),
                 temperature=self.reports.temperature, heat_age_s=now_s - self.reports.temperature_s,
                 part=at.part, parts=at.parts, layer=at.layer,

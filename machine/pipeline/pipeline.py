@@ -117,7 +117,8 @@ def decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
         price, records = _price(request, to_build and not laying), list[Record]()
 
         def search(mesh: Mesh) -> Decomposition:
-            return _search(request, _plan_with_marks(request, given, model, mesh), price, report, records, mesh)
+            plan = _plan_with_marks(request, given, model, mesh)
+            return _search(request, plan, price, report, records, mesh, needs_front=not to_build)
 
         if laying:
             oriented = orient_and_decompose(mesh, profile, pricing, search)
@@ -143,10 +144,17 @@ def _price(request: ModelRequest, unused: bool) -> Pricing | None:
 
 
 def _search(
-    request: ModelRequest, given: PlanFile | None, price: Pricing | None, report: Report, records: list[Record], mesh: Mesh
+    request: ModelRequest,
+    given: PlanFile | None,
+    price: Pricing | None,
+    report: Report,
+    records: list[Record],
+    mesh: Mesh,
+    *,
+    needs_front: bool,
 ) -> Decomposition:
     """The parts of a mesh in its orientation, searched or cut by a plan. records: receives the search's record."""
-    asked = SearchRequest(given or NO_PLAN, request.parts, request.ranker, price)
+    asked = SearchRequest(given or NO_PLAN, request.parts, request.ranker, price, needs_front=needs_front)
     if request.plan is not None:
         return cut_by_plan(mesh, request.name, request.profile, asked)
 

@@ -5,6 +5,7 @@ The port's name is parsed here, once; all other code uses the value.
 
 import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 from ipaddress import IPv6Address
 from math import isfinite
 from pathlib import Path
@@ -89,6 +90,8 @@ def parse_destination(port: str, baud: int = BAUD, speed: float = 0.0) -> Destin
     if not DEVICE.fullmatch(port) or not port.isprintable() or port != port.strip():
         shown = f"...@{port.rpartition('@')[2]}" if "@" in port else port  # the text before it may be a password
         raise PrinterError(f"port {_plain(shown)!r} cannot be one: a device, {SIMULATED}, {ADDRESSES}, {SERVERS} is expected")
+    if get_close_matches(port.lower(), [SIMULATED]) and not Path(port).exists():
+        raise PrinterError(f"port {_plain(port)} does not exist: did you mean {SIMULATED}, the simulated printer?")
     return SerialPort(port, baud)
 
 

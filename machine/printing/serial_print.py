@@ -9,7 +9,7 @@ from machine.dryrun.dryrun import Timeline
 from machine.link.identification import Answer, Kind
 from machine.link.journal import Journal
 from machine.link.port import open_port
-from machine.link.print_state import PrintStatus
+from machine.link.print_state import PrintState, PrintStatus
 from machine.link.resume import ResumePoint
 from machine.link.shutdown import Heaters
 from machine.link.status import PrinterStatus
@@ -140,7 +140,8 @@ def stream_program(
 
         def on_progress(status: PrintStatus) -> None:
             if begun:
-                left_s = time_left_s(timeline.remaining_s, first, status, pace)
+                ends = status.state is PrintState.CANCELLING
+                left_s = None if ends else time_left_s(timeline.remaining_s, first, status, pace)
                 tell(replace(status, left_s=left_s, layers=timeline.layers(status.part), at=timeline.at(status.file_line)))
 
         return print_lines(

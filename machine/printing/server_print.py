@@ -211,13 +211,14 @@ class ReportedProgress:
         if self._upload is None or timeline is None:
             return status
         self._read_to(self._upload.line_at(status.bytes_read or 0))
+        remaining_s = timeline.remaining_s(self.line)
         return replace(
             status,
             sent=self.line,
             acknowledged=self.line,
             total=len(self._lines),
             file_line=self.line,
-            left_s=timeline.remaining_s(self.line) * 100.0 / status.feed_percent,
+            left_s=None if status.state is PrintState.CANCELLING else remaining_s * 100.0 / status.feed_percent,
             share=position.share(self.line, len(self._lines)),
             part=position.part,
             parts=position.parts,

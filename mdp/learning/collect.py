@@ -109,7 +109,7 @@ def _rows(out: Path, settings: Settings) -> dict[Key, Row]:
     rows = {row.key: row for row in read_index(out)}
     others = sorted({row.settings for row in rows.values()} - {settings.in_words})
     if others:
-        raise UserError(f"folder {out}: holds searches with {others[0]}, not {settings.in_words}: take another folder")
+        raise UserError(f"folder {out} holds searches with {others[0]}, not {settings.in_words}: take another folder")
     return rows
 
 

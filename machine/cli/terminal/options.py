@@ -253,7 +253,7 @@ def named_models(models: list[str]) -> list[str]:
             continue
         name, count = counted.groups()
         if not re.fullmatch(r"[0-9]{1,9}", count) or not 1 <= int(count) <= MOST_COPIES:
-            raise PlanError(f"{text}: the number of copies behind {name}: must be a whole number from 1 to {MOST_COPIES}")
+            raise PlanError(f"{text}: the number of copies behind {name} must be a whole number from 1 to {MOST_COPIES}")
         named += int(count) * [name]
     return named
 

@@ -515,3 +515,28 @@ def test_a_closed_standard_output_is_no_bug() -> None:
     command = f"{sys.executable} -m machine.cli.cli profiles list >&-"
     ended = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_the_entry_point_runs_as_a_module() -> None:
+    command = [sys.executable, "-m", "machine.cli.start", "--version"]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.startswith("tiltprint ")
+
+
+def test_a_saved_profile_is_overwritten_only_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    own = tmp_path / "own.toml"
+    save = ["profiles", "save", "pla", "-o", str(own), "--set"]
+    assert main([*save, "material.nozzle_c=200"]) == 0
+    assert main([*save, "material.nozzle_c=205"]) == 1
+    assert "own.toml exists: --replace writes over it, another name leaves it" in capsys.readouterr().err
+    assert "200" in own.read_text()
+    assert main([*save, "material.nozzle_c=205", "--replace"]) == 0
+    assert ("205" in own.read_text(), "200" in own.with_suffix(".toml.before").read_text()) == (True, True)
+
+
+def test_an_export_in_one_part_searches_no_parts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("machine.notices.PLAIN_EVERY_S", 0.0)
+    out = str(tmp_path / "out.gcode")
+    assert main(["export", "demo:bracket", *FAST, "--parts", "1", "--set", "process.scale=0.3", "-o", out]) == 0
+    assert "searching parts" not in capsys.readouterr().err

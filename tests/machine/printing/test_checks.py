@@ -31,7 +31,7 @@ from machine.printing.checks import (
     machine_sentences,
     program_sentences,
 )
-from machine.printing.destination import SerialPort
+from machine.printing.destination import SerialPort, parse_destination
 from machine.printing.servers.server import Identity
 from machine.program import Program
 from machine.simulator.simulator import SimulatedPrinter
@@ -347,3 +347,9 @@ def test_klipper_is_not_asked_for_letters_that_the_start_block_makes() -> None:
 def test_a_program_at_the_limit_is_inside(reach: tuple[float, float], refused: bool) -> None:
     answer = Answer(Kind.PRINTER, "", "XYZAC", {"A": (-90.0, 90.0)})
     assert bool(exceeded_limit(answer, {"A": reach, "C": (-1e6, 1e6)})) is refused
+
+
+def test_a_mistyped_sim_is_not_taken_for_a_device() -> None:
+    with pytest.raises(PrinterError, match=r"^port simm does not exist: did you mean sim, the simulated printer\?$"):
+        parse_destination("simm")
+    assert parse_destination("COM3") == SerialPort("COM3")

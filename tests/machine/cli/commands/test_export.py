@@ -89,4 +89,4 @@ def test_export_without_a_name_writes_the_model_s_here_and_ends_with_a_verdict(
     assert main(["export", "box.stl", *FAST]) == 1
     assert "output box.gcode exists and was not written by tiltprint: -o names another file" in capsys.readouterr().err
     assert main(["print", "box.stl", *FAST, "--as-is", "--port", "sim"]) == 0
-    assert re.search(r"\ndone in \d+s\n$", capsys.readouterr().out)
+    assert re.search(r"\ndone in \d+s: \d+s before the print, \d+s of printing\n$", capsys.readouterr().out)
