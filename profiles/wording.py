@@ -77,7 +77,7 @@ def _sentence(problem: Any, text: str, root: type[BaseModel], prefix: str) -> st
 
 
 def decimal_hint(given: Any) -> str:
-    """What to write instead of a number with a decimal comma; "" for any other value."""
+    """Hint to write a number with a decimal point instead of a comma; "" for any other value."""
     text = given.strip() if isinstance(given, str) else ""
     return f": write {text.replace(',', '.')}" if DECIMAL_COMMA.fullmatch(text) else ""
 

@@ -106,11 +106,11 @@ NO_PRINTERS: Mapping[Kind, tuple[type[PrinterError], str, str]] = {
         "what answers at {port} is no printer: {stranger} instead of answering M115",
         "something answers but is no printer: {stranger}",
     ),
-    Kind.RUBBISH: (
+    Kind.GARBLED: (
         PortError,
-        "only rubbish comes from {port} at {baud} baud, and no printer answers at the usual other rates: "
-        f"the firmware's settings tell {phrase('its baud rate', 'its rate for --baud')}",
-        f"rubbish at {{baud}} baud, and nothing at the usual other rates: "
+        "only garbled bytes come from {port} at {baud} baud, and no printer answers at the usual other rates: "
+        f"the firmware's settings name {phrase('its baud rate', 'its rate for --baud')}",
+        f"garbled bytes at {{baud}} baud, and nothing at the usual other rates: "
         f"{phrase('another baud rate', '--baud N tries another')}",
     ),
     Kind.SILENT: (

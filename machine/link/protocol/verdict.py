@@ -7,14 +7,14 @@ from profiles.errors import FirmwareError, PrinterError, SilenceError
 from profiles.messages import advice
 
 SYNC_TRIES = 6  # a board that resets on opening spends one or two of them in its boot loader
-RUBBISH_TRIES = 2  # boot loaders have baud rates of their own; later bytes are the firmware's
+GARBLED_TRIES = 2  # boot loaders have baud rates of their own; later bytes are the firmware's
 LOST = "position and temperatures are lost, the print cannot go on"
 
 
 def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: str = "") -> PrinterError | None:
     """The error after `tries` greetings, None while another makes sense. heard: what came instead of an answer."""
     at = "this baud rate" if baud is None else f"{baud} baud"
-    if tries >= RUBBISH_TRIES and decoder.rubbish:
+    if tries >= GARBLED_TRIES and decoder.is_garbled:
         others = ", ".join(str(rate) for rate in BAUDS if rate != baud)
         return PrinterError(
             f"the bytes received at {at} are garbled: the printer speaks at another rate, {advice('baud', others, 'try')}"

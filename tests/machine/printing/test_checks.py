@@ -71,7 +71,7 @@ def talking_at(rate: int) -> Words:
 
 AT = SerialPort("/dev/ttyACM0")
 STRANGERS: dict[str, tuple[Words, str]] = {
-    "rubbish": (lambda data, baud: b"\xf8\x80\x9e\xe6" * 8, "only rubbish comes from PORT at 115200 baud"),
+    "garbled": (lambda data, baud: b"\xf8\x80\x9e\xe6" * 8, "only garbled bytes come from PORT at 115200 baud"),
     "silence": (lambda data, baud: b"", "nothing answers at PORT: is the printer switched on, and is 115200 baud"),
     "a modem": (lambda data, baud: b"ERROR 42\r\n", "what answers at PORT is no printer: it says 'ERROR 42'"),
     "an echo": (lambda data, baud: data, "what answers at PORT is no printer: it sends back what it receives"),

@@ -99,7 +99,7 @@ def test_asking_ends_when_it_is_called_off() -> None:
 
 @pytest.mark.parametrize(("kind", "words", "line"), [
     (Kind.SILENT, "", "nothing answers"),
-    (Kind.RUBBISH, "", "rubbish at 9600 baud, and nothing at the usual other rates: --baud N tries another"),
+    (Kind.GARBLED, "", "garbled bytes at 9600 baud, and nothing at the usual other rates: --baud N tries another"),
     (Kind.STRANGER, "AT+OK", "something answers but is no printer: it says 'AT+OK'"),
     (Kind.STRANGER, "M115", "something answers but is no printer: it sends back what it receives"),
     (Kind.HALTED, "Error:MAXTEMP", "a printer that has stopped with an error (Error:MAXTEMP), at 9600 baud"),
