@@ -96,7 +96,7 @@ def to_streams(notice: Notice) -> None:
     """Write results to stdout, all else to stderr."""
     stream = sys.stdout if notice.is_result else sys.stderr
     text = terminal_words(notice.text)
-    stream.write(f"{text.rstrip()}; going on because of --force\n" if notice.forced else text)
+    stream.write(f"{text.rstrip()}; continuing because of --force\n" if notice.forced else text)
     stream.flush()
 
 

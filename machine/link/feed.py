@@ -108,7 +108,7 @@ class Feed:
         overrides = f"M220 S{self.pending.feed_percent:g}", f"M221 S{self.pending.flow_percent:g}"
         for command in (*overrides, *resume_point.before):
             self.exchange.send(command)
-        self._verify_position("before the print goes on")
+        self._verify_position("before the print continues")
         self.set_state(PrintState.PRINTING)
 
     def _skip(self, command: str) -> None:

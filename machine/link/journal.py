@@ -309,7 +309,7 @@ def read_journal(path: Path) -> JournalContents:
         raise _incomplete(path)
     values = _value(first)
     if values is None:
-        raise JournalError(f"{path} is no journal of a print: its first line is not the heading of one")
+        raise JournalError(f"{path} is not the journal of a print: its first line is not a journal's heading")
     heading, key, boot = _heading(path, values)
     if is_noted_incomplete(key):
         raise _incomplete(path)
@@ -323,15 +323,15 @@ def read_journal(path: Path) -> JournalContents:
 
 def _incomplete(path: Path) -> JournalError:
     return JournalError(
-        f"journal {path} is incomplete: its print went on when the journal could not be written any more, so nobody knows how "
-        "far it came, and it cannot be resumed"
+        f"journal {path} is incomplete: its print continued after the journal could no longer be written: how far it came is "
+        "unknown, and it cannot be resumed"
     )
 
 
 def _read(path: Path) -> tuple[bytes, list[bytes]]:
     """The heading, and the blocks of the records."""
     if lexists(path) and not isfile(path) and not isdir(path):  # reading a pipe would block
-        raise JournalError(f"journal {path} cannot be read: it is no file")
+        raise JournalError(f"journal {path} cannot be read: it is not a file")
     try:
         with path.open("rb") as file:
             first, slots = _blocks(file)
@@ -364,7 +364,7 @@ def _heading(path: Path, value: Any) -> tuple[JournalHeading, str, str]:
         case {"key": str(key), "boot": str(boot), "program": str(program), "sha256": str(sha256), "name": str(name),
               "profile": dict(profile)} if key.isascii() and key.isalnum():  # fmt: skip
             return JournalHeading(program, sha256, name, profile), key, boot
-    raise JournalError(f"journal {path} is damaged: its heading does not tell program and profile")
+    raise JournalError(f"journal {path} is damaged: its heading lacks the program or the profile")
 
 
 def _checkpoint(path: Path, value: Any, slot: int) -> tuple[int, Checkpoint]:

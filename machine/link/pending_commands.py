@@ -242,7 +242,7 @@ def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:
     if row.homes or row.moves == "table" or row.probes:
         return f"{name} homes, probes or turns an axis: the tip may stand inside the print"
     if row.motors:
-        return f"{name} lets the motors go: the print would lose its place"
+        return f"{name} switches the motors: the print would lose its position"
     if row.changes:
         return f"{name} changes what the rest of the program means"
     if row.moves and not (paused and _filament_only(command)):

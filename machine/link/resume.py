@@ -33,11 +33,11 @@ from profiles.machine import Machine
 from profiles.messages import key_name, option, phrase
 from profiles.profile import Profile
 
-TOO_LITTLE = "hardly anything was printed: the program begins anew"
+TOO_LITTLE = "hardly anything was printed: the program begins again"
 PARKED = (PrintState.PAUSED, PrintState.CANCELLED)  # states in which the journal's pose is the parking position
 MOVING = (PrintState.PAUSING, PrintState.RESUMING)
 HOME_IT = (
-    f"write into {key_name('machine.gcode.resume')} of a profile of this machine how it is homed with a print on it "
+    f"state in {key_name('machine.gcode.resume')} of a profile of this machine how it is homed with a print on it "
     "(docs/serial.md), and name "
     f"that profile {phrase('homed as in', 'with --machine')}"
 )
@@ -141,7 +141,7 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
         # homing resets the offset in most firmwares
         held_mm = offset_mm if babystep.endswith(KEEPS_OFFSET) and not (begun or status.greeted) else 0.0
         words = _offset_in_words(held_mm) if held_mm or not offset_mm else f"; set its Z offset of {offset_mm:+g} mm again"
-        return ResumePoint(1, (), f"{TOO_LITTLE}, clear the table of the little there may be{words}", z_offset_mm=held_mm)
+        return ResumePoint(1, (), f"{TOO_LITTLE}, clear the plate first{words}", z_offset_mm=held_mm)
     _check(point, profile)
     span = f"lines {point.line} to {point.last} may have been printed already"
     at = _reported_position(point, status) if alive or (alive is None and not begun) else None
@@ -165,7 +165,7 @@ def _check_begun(status: PrinterStatus, begun: bool) -> None:
     if not begun:
         keys = ", ".join(f"{key_name(f'machine.{key}')}" for key in HOME_KEYS)
         raise JournalError(
-            f"the printer's line numbers have begun anew, but it says that it stands at {_in_words(status)}: "
+            f"the printer's line numbers have restarted, but it reports the position {_in_words(status)}: "
             "it was homed or moved since; switch it off and on, move nothing, and resume again. "
             "If it says the same place then, that is where its firmware "
             f"starts: write it as {keys} into a profile of this machine and name that {phrase('homed as in', 'with --machine')}"
@@ -180,10 +180,10 @@ def _check_begun(status: PrinterStatus, begun: bool) -> None:
 def _check(point: InterruptedPrint, profile: Profile) -> None:
     missing = [letter for letter, value in zip("XYZ", point.modal.at[:3], strict=True) if value is None]
     if missing:
-        raise JournalError(f"line {point.line}: the program does not tell where {' '.join(missing)} stand: it cannot go on there")
+        raise JournalError(f"line {point.line}: where {' '.join(missing)} stand is unknown: the print cannot continue there")
     if profile.machine.coordinates == "workpiece":
         raise JournalError(
-            f"{profile.machine.name} follows the table by itself: its print can only go on while the printer still stands in it"
+            f"{profile.machine.name} follows the table by itself: its print can continue only if the printer has not moved since"
         )
 
 
@@ -272,13 +272,13 @@ def position_at_interruption(point: InterruptedPrint, profile: Profile) -> tuple
     if state in PARKED and len(known) == E_AXIS:
         return np.array([*known[:2], known[2] + point.checkpoint.z_offset_mm]), Pose(*known[3:])
     if state in MOVING and not profile.machine.gcode.resume:
-        raise JournalError(f"the tip was on its way between print and parking place, so nobody knows where it stands; {HOME_IT}")
+        raise JournalError(f"the tip was on its way between print and parking place, so its position is unknown; {HOME_IT}")
     states = [point.modal, *point.ahead.values()]
     for axis in (3, 4):
         if len({modal.at[axis] for modal in states}) > 1 and not profile.machine.gcode.resume:
             letter = point.modal.axes.letters[axis]
             where = f"lines {point.line} to {point.last}"
-            raise JournalError(f"{where}: the table was turning about {letter}, so nobody knows where it stands; {HOME_IT}")
+            raise JournalError(f"{where}: the table was turning about {letter}, so its position is unknown; {HOME_IT}")
     at, pose = _goal(point, profile)
     return np.array([at[0], at[1], heights_mm(point)[0]]), pose
 

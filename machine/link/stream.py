@@ -177,7 +177,7 @@ class _Print:
     def _cancel(self) -> Heaters | None:
         if not self.feed.started:
             return None
-        waits = "the printer is waited for: what it does now (homing, a dwell) must not be stopped" if self.exchange.waits else ""
+        waits = "waiting for the printer: its homing or dwell must not be interrupted" if self.exchange.waits else ""
         self.feed.set_state(PrintState.CANCELLING, waits)
         return self._shut_down(SETTLE_S)
 
@@ -240,7 +240,7 @@ class _Print:
             return f"; {self.journal.warning}"
         if not self.feed.history.executed:
             return ""
-        return f"; tiltprint resume {self.journal.path} goes on with it"
+        return f"; tiltprint resume {self.journal.path} continues it"
 
     def _outcome(self, start_s: float, heaters: Heaters | None) -> Outcome:
         feed = self.feed

@@ -257,7 +257,7 @@ def _without_pins(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: 
         if not part.on_plate and own.process.interlock == "pins" and not piece.pins:
             room_mm = pin_width_mm(own) + 2.0 * room_around_mm(own.process)
             deep = f"{own.process.pin_depth_mm:g} mm deep into the part below"
-            yield f"no pins under part {part.index}: one wants a place {room_mm:.1f} mm wide, where the part stands and {deep}"
+            yield f"no pins under part {part.index}: a pin needs an area {room_mm:.1f} mm wide, {deep}"
 
 
 def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:
@@ -268,7 +268,7 @@ def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:
             f"{key_name('process.raft_first_layer_expansion_mm')} makes that wider"
         )
     if profile.machine.purge_mm > 0.0 and not has_purge(program):
-        yield f"no place on the plate is clear of the print for a line of {key_name('machine.purge_mm')}: there is none"
+        yield f"{key_name('machine.purge_mm')} has no effect: no place on the plate is clear of the print for a purge line"
     dialect = dialect_of(profile.machine)
     if profile.material.pressure_advance is not None and not dialect.pressure_advance:
         yield f"{key_name('material.pressure_advance')} is left out: {dialect.firmware} has no command for it"

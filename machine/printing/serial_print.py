@@ -74,7 +74,7 @@ class SerialPrinter:
         except OutputError as error:
             if file is not None:
                 raise
-            say(f"this print cannot be resumed when it is cut off: {error}")
+            say(f"this print cannot be resumed if it is interrupted: {error}")
             return nullcontext()
 
     def fits(self, machine: Machine) -> str:
@@ -210,7 +210,7 @@ def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal 
         if outcome.kept:
             say(outcome.kept)
         if journal is not None and journal.last.executed and not journal.trouble:
-            say(f"tiltprint resume {journal.path} goes on with it")
+            say(f"tiltprint resume {journal.path} continues it")
         return CANCELLED
     summary = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
     show(f"{summary} ({Answer(Kind.PRINTER, outcome.firmware).firmware[:60]})\n")

@@ -23,7 +23,7 @@ from profiles.errors import FirmwareError, NoAnswerError, ServerError
 from profiles.machine import Machine
 
 LIMITS = (
-    "the server prints its own copy: this computer may go, but there is no journal to resume from after a power cut, "
+    "the server prints its own copy: this computer may be off, but there is no journal to resume from after a power cut, "
     "and pausing and cancelling do what the server's own macros say"
 )
 
@@ -131,8 +131,8 @@ class ServerPrinter:
             show(f"printed {file} on {server.name} in {duration(progress.elapsed_s)}\n")
             return DONE
         if state is PrintState.LEFT:
-            say(f"tiltprint: interrupted; {file} goes on printing on {server.name}")
-            return End(state, f"{name} goes on printing on {server.name}: this page follows it no more")
+            say(f"tiltprint: interrupted; {file} keeps printing on {server.name}")
+            return End(state, f"{name} keeps printing on {server.name}: this page no longer follows it")
         after = f" after {progress.line} lines" if progress.line else ""
         say(f"tiltprint: interrupted; the print was cancelled on {server.name}{after}")
         return CANCELLED

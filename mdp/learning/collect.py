@@ -43,7 +43,7 @@ MOST_WIDE = 1000  # as search.beam_width allows
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Collect the missing records; returns the exit code."""
-    return command.run(collect, arguments, "started again, the collection goes on where it stopped")
+    return command.run(collect, arguments, "started again, the collection continues where it stopped")
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:

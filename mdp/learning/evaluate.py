@@ -30,7 +30,7 @@ SHUFFLES, CUT = 10, 5  # importance is the loss of NDCG@5, averaged over this nu
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the tables and draw the figures; returns the exit code."""
-    return run(evaluate, arguments, "nothing is kept, it begins anew")
+    return run(evaluate, arguments, "nothing is kept, it starts again")
 
 
 def evaluate(arguments: Sequence[str] | None) -> None:

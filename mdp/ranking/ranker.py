@@ -70,7 +70,7 @@ class LearnedRanker:
         unknown = [name for name in columns if name not in FEATURES]
         if not columns or unknown:
             wrong = f"wants the feature {unknown[0]}, which this version does not know" if unknown else "names no features"
-            raise UserError(f"ranker {self.file}: {wrong}; train it anew with this version")
+            raise UserError(f"ranker {self.file}: {wrong}; train it again with this version")
         (given,) = self._session.get_inputs()
         if list(given.shape)[1:] != [len(columns)]:
             raise UserError(f"ranker {self.file} takes {given.shape}, {len(columns)} features a candidate are named")

@@ -77,7 +77,7 @@ def _inherited(file: Path, document: Mapping[str, Any], below: tuple[Path, ...])
     if beside is None:
         return own, f"inherits {parent}"
     if beside in (file, *below):
-        raise ProfileError(f"profile {file} inherits itself by way of {parent}")
+        raise ProfileError(f"profile {file} inherits itself through {parent}")
     values, missing = _inherited(beside, read_json(beside), (*below, file))
     return values | own, missing
 

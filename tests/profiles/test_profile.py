@@ -325,7 +325,7 @@ def test_a_file_inherits_from_a_file_beside_it(tmp_path: Path) -> None:
 def test_a_circle_of_files_is_refused(tmp_path: Path) -> None:
     written(tmp_path, 'inherits = "mine.toml"\n[process]\nwalls = 1\n', "other.toml")
     file = written(tmp_path, 'inherits = "other.toml"\n[process]\nwalls = 1\n')
-    with pytest.raises(ProfileError, match=r"mine\.toml inherits itself by way of .*other\.toml"):
+    with pytest.raises(ProfileError, match=r"mine\.toml inherits itself through .*other\.toml"):
         load(process=file)
     assert "inherits itself" in check_file(Path(file))[0]
 

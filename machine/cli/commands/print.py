@@ -96,7 +96,7 @@ def resume(journal: Path, port: str, asked: ResumeOptions, named: Profile | None
     for sentence in cut_off.sentences():
         say(sentence)
     if asked.yes and not cut_off.story.computer_ran_on:
-        raise JournalError(f"journal {journal}: a person must answer that question: resume at a terminal, without --yes")
+        raise JournalError(f"journal {journal}: you must answer that question: resume at a terminal, without --yes")
     rest = rest_of(cut_off)
     with _watched(rest, asked.watching, person) as watched:
         end = print_rest(cut_off, rest, job, person)

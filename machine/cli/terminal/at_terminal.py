@@ -53,17 +53,15 @@ class AtTerminal:
         say_lines(question)
         listed = ", ".join(f"{number}: {choice}" for number, choice in enumerate(choices, 1))
         if choices and (self._yes or not sys.stdin.isatty()):
-            raise JournalError(
-                f"a person must see at which height the tip stands ({listed}): resume at a terminal, without --yes"
-            )
+            raise JournalError(f"you must see at which height the tip stands ({listed}): resume at a terminal, without --yes")
         if choices:
             chosen = _answer(f"which? [{listed}; anything else: none] ")
             return int(chosen) - 1 if chosen in [str(number) for number in range(1, len(choices) + 1)] else None
         if self._yes:
             return 0
         if not sys.stdin.isatty():
-            raise JournalError("whether to go on is asked first: give --yes where there is no terminal to ask at")
-        return 0 if _answer("go on? [y/N] ") in ("y", "yes") else None
+            raise JournalError("resume asks before it continues: give --yes if there is no terminal")
+        return 0 if _answer("continue? [y/N] ") in ("y", "yes") else None
 
     @contextmanager
     def show(self, scene: Scene) -> Iterator[Show]:

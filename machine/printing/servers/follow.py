@@ -36,7 +36,7 @@ JOIN_S = 0.5  # an order that still waits for its answer then is left to the ser
 BEGIN_S = 15.0  # a server that has accepted a start shows it within this time
 QUIET_S = 15.0  # silence after which it is reported
 LOST_S = 120.0  # silence after which the state of the print counts as unknown
-UNKNOWN = "whether the print goes on there is not known"
+UNKNOWN = "whether the print continues there is unknown"
 UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({error})"
 UNHEARD_SHIFT = (
     "sent {command}, but {server} does not say whether the firmware knows it (Marlin needs BABYSTEPPING): see that the tip moves"
@@ -156,7 +156,7 @@ class Follower:
         if silent_s > LOST_S:
             where = error or self.server.name
             heat = last_known(self._heat, silent_s)
-            raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may go on, look at the printer{heat}")
+            raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may continue: look at the printer{heat}")
         if status is None:
             return None
         quiet = error is not None or silent_s > QUIET_S
@@ -173,7 +173,7 @@ class Follower:
         self._heat = heat if heat.words else self._heat
         if status.state.is_printing:
             if self._last_active is not None and status.file not in ("", self.file):
-                raise ServerError(f"{self.server.name} prints {status.file} now: what became of {self.file} is not known")
+                raise ServerError(f"{self.server.name} prints {status.file} now: what happened to {self.file} is unknown")
             self._last_active, self._read = status.state, max(self._read, status.bytes_read or 0)
             return None
         if status.state is PrintState.OFFLINE or (status.state is PrintState.FAILED and self._last_active is not None):

@@ -42,7 +42,7 @@ class OctoPrint(PrintServer):
         value = self._get("/api/version", "to say who it is")
         text = value.get("text") if isinstance(value, dict) else None
         if not isinstance(text, str) or not text.startswith("OctoPrint"):
-            raise ServerError(f"{self.name} is no OctoPrint: it does not answer /api/version as one")
+            raise ServerError(f"{self.name} is not an OctoPrint: it does not answer /api/version as one")
         if "moonraker" in text.lower():
             raise ServerError(f"{self.name} is a Moonraker that speaks as OctoPrint: use moonraker:HOST")
         return Identity(text)

@@ -78,7 +78,7 @@ WRONG = [
     (["export", "demo:tree", "-o", "x.gcode", "--part", "2:walls=-4"], "part 2: process.walls is -4: it must be a whole number"),
     (["export", "demo:tree", "-o", "x.gcode", "--copies", "0"], "--copies is 0: 1 to 1000 is allowed"),
     *(
-        (["export", f"demo:tree:{count}", "-o", "x.gcode"], "demo:tree: must be a whole number from 1 to 1000")
+        (["export", f"demo:tree:{count}", "-o", "x.gcode"], "demo:tree must be a whole number from 1 to 1000")
         for count in ("0", "-1", "2.5", "1001", "")
     ),
     (
@@ -351,7 +351,7 @@ def test_a_plan_that_lays_the_model_down_does_not_go_with_keeping_it(folder: Pat
     assert main(["decompose", "tee.stl", "--plan", "tee.toml", "--json", "out.json"]) == 0
     assert json.loads(Path("out.json").read_text())["rotate_deg"] == [90.0, 0.0, 0.0]
     assert main(["decompose", "tee.stl", "--plan", "tee.toml", "--as-is"]) == 1
-    assert "--as-is: the plan tee.toml lays the model down by its orientation" in capsys.readouterr().err
+    assert "--as-is: the plan tee.toml gives the model's orientation" in capsys.readouterr().err
 
 
 STAYS = [

@@ -116,11 +116,11 @@ def test_a_journal_never_grows(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("content", "words"), [
     (b"", "is empty"),
-    (b"G28\nG1 X5\n", "is no journal of a print"),
+    (b"G28\nG1 X5\n", "is not the journal of a print"),
     (b"%08x {}\n" % crc32(b"{}"), "another version"),
     (b'%08x {"format":2}\n' % crc32(b'{"format":2}'), "another version of this program: this one reads format 3"),
-    (b'%08x {"format":3}\n' % crc32(b'{"format":3}'), "does not tell program and profile"),
-    (os.urandom(5000), "is no journal"),
+    (b'%08x {"format":3}\n' % crc32(b'{"format":3}'), "lacks the program or the profile"),
+    (os.urandom(5000), "is not the journal"),
 ])  # fmt: skip
 def test_what_is_no_journal_is_refused_with_a_sentence(tmp_path: Path, content: bytes, words: str) -> None:
     (tmp_path / "j").write_bytes(content)

@@ -364,7 +364,7 @@ def test_a_height_in_doubt_is_not_guessed(text: GcodeFile, tmp_path: Path, capsy
         assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 1
     errors = capsys.readouterr().err
     assert "it stands at Z 62.00 or Z 62.20; look at the print below it, for Z is not homed" in errors
-    assert "a person must see at which height the tip stands (1: Z 62.00, 2: Z 62.20)" in errors
+    assert "you must see at which height the tip stands (1: Z 62.00, 2: Z 62.20)" in errors
 
 
 @pytest.mark.parametrize(("said", "called"), [("2", "Z62.2 "), ("n", "")])
@@ -477,9 +477,9 @@ MOVED = {"X": 50.0, "Y": 50.0, "Z": 50.0}
     (point(TURN, TURN + 5), asked(), PROFILE, r"the table was turning about A.*machine\.gcode\.resume"),
     (cut_off(PROGRAM, ON_THE_WAY), asked(), PROFILE, "was on its way between print and parking place"),
     (cut_off(PROGRAM, replace(ON_THE_WAY, state="resuming")), asked(), PROFILE, "was on its way between print and parking place"),
-    (point(LINE), asked(MOVED), PROFILE, "stands at X50 Y50 Z50: it was homed or moved since; switch it off and on"),
+    (point(LINE), asked(MOVED), PROFILE, "reports the position X50 Y50 Z50: it was homed or moved since; switch it off and on"),
     (point(LINE), asked(AT_HOME, last=7), PROFILE, "another program has sent it 7 lines since: it may have been homed"),
-    (cut_off(NOWHERE, Checkpoint(14, 14, 13, 5)), asked(), PROFILE, "does not tell where X Y Z stand"),
+    (cut_off(NOWHERE, Checkpoint(14, 14, 13, 5)), asked(), PROFILE, "where X Y Z stand is unknown"),
     (point(LINE), asked(), FOLLOWING, "follows the table by itself"),
 ])  # fmt: skip
 def test_where_going_on_would_be_a_guess_it_is_refused(
@@ -615,7 +615,7 @@ def test_the_command_resumes_a_cancelled_print_and_refuses_to_do_it_twice(
     assert re.search(r"p, part [23] of 3, (layer 1, )?line \d+ of 310", errors)
     assert "has not restarted and knows its place" in errors
     assert "watch the print at http://" in errors
-    assert "was resumed already, what became of it is in" in errors
+    assert "was resumed already, its rest is in" in errors
     assert record.end[-1, 3:5].tolist() == [-20.0, 360.0]
 
 
@@ -703,7 +703,7 @@ def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that
     assert main(["resume", str(journal.path), "--port", "sim"]) == 1
     errors = capsys.readouterr().err
     assert "--machine gives another machine" in errors
-    assert "give --yes where there is no terminal" in errors
+    assert "give --yes if there is no terminal" in errors
     assert "ran to its end" in errors
     assert "a simulated printer ends with its print" in errors
 

@@ -20,7 +20,7 @@ def test_a_bundle_that_was_waited_for_is_not_compiled_again(unmarked, capsys):
     compilers = Compilers()
     compilers.wait_for(["dry-run"])
     assert (unmarked / "dry-run").exists()
-    assert "compiling the kernels (only the first run that needs them does)" in capsys.readouterr().err
+    assert "compiling the kernels, once, for the first run that needs them" in capsys.readouterr().err
     Compilers().wait_for(["dry-run"])
     assert capsys.readouterr().err == ""
 

@@ -73,9 +73,9 @@ AT = SerialPort("/dev/ttyACM0")
 STRANGERS: dict[str, tuple[Words, str]] = {
     "garbled": (lambda data, baud: b"\xf8\x80\x9e\xe6" * 8, "only garbled bytes come from PORT at 115200 baud"),
     "silence": (lambda data, baud: b"", "nothing answers at PORT: is the printer switched on, and is 115200 baud"),
-    "a modem": (lambda data, baud: b"ERROR 42\r\n", "what answers at PORT is no printer: it says 'ERROR 42'"),
-    "an echo": (lambda data, baud: data, "what answers at PORT is no printer: it sends back what it receives"),
-    "a mill": (scripted({}, "error:20"), "what answers at PORT is no printer: it says 'error:20'"),
+    "a modem": (lambda data, baud: b"ERROR 42\r\n", "the device at PORT is not a printer: it says 'ERROR 42'"),
+    "an echo": (lambda data, baud: data, "the device at PORT is not a printer: it sends back what it receives"),
+    "a mill": (scripted({}, "error:20"), "the device at PORT is not a printer: it says 'error:20'"),
     "a halted one": (
         scripted({}, "Error:Printer halted. kill() called!"),
         "the printer at PORT has stopped with an error of its own (Error:Printer halted. kill() called!)",
@@ -83,7 +83,7 @@ STRANGERS: dict[str, tuple[Words, str]] = {
     "a busy one": (scripted({}, "echo:busy: processing"), "the printer at PORT is busy"),
     "three axes": (
         scripted({"M115": f"{NAMED}ok", "M114": "X:0.00 Y:0.00 Z:0.00 E:0.00 Count X:0 Y:0 Z:0\nok"}),
-        "the printer's firmware moves X Y Z, but generic A/C table needs X Y Z A C: A and C are missing (--force goes on)",
+        "the printer's firmware moves X Y Z, but generic A/C table needs X Y Z A C: A and C are missing (--force continues)",
     ),
     "Klipper": (
         scripted({"M115": "ok FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.12", "M114": "X:0.0 Y:0.0 Z:0.0 E:0.0\nok"}),
@@ -221,10 +221,10 @@ def test_a_program_for_another_machine_is_refused_unless_forced(
     with SimulatedPrinter(MACHINE) as printer:
         assert printed(printer.path, file, "--machine", "generic_ac") == 1
         sentence = f"part.gcode was made for the machine {foreign.machine.name}, not for {MACHINE.name}"
-        assert f"{sentence} (--force goes on)" in capsys.readouterr().err
+        assert f"{sentence} (--force continues)" in capsys.readouterr().err
         assert printer.record.lines == len(["M115", "M114"])
         assert printed(printer.path, file, "--machine", "generic_ac", "--force") == 0
-    assert f"{sentence}; going on because of --force" in capsys.readouterr().err
+    assert f"{sentence}; continuing because of --force" in capsys.readouterr().err
 
 
 def _machines() -> list[str]:

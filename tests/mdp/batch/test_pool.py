@@ -65,7 +65,7 @@ def test_a_scheduler_that_dies_is_one_sentence() -> None:
     distributed = pytest.importorskip("distributed")
     cluster = distributed.LocalCluster(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=":0")
     with (
-        pytest.raises(UserError, match="is gone; started again, the work goes on where it stopped"),
+        pytest.raises(UserError, match="is gone; started again, the work continues where it stopped"),
         connected(Workers(cluster.scheduler_address, 1, 0)) as queue,
     ):
         list(queue.completed(time.sleep, {"long": (2.0,)}, cluster.close))

@@ -56,7 +56,7 @@ def test_an_interrupt_ends_all_processes_at_once(tmp_path: Path) -> None:
     time.sleep(1.0)
     os.killpg(run.pid, signal.SIGINT)
     assert run.stderr is not None
-    assert run.stderr.read() == "interrupted; started again, the collection goes on where it stopped\n"
+    assert run.stderr.read() == "interrupted; started again, the collection continues where it stopped\n"
     assert run.wait() == 130
     with pytest.raises(ProcessLookupError):  # the group is empty
         _until_gone(run.pid)

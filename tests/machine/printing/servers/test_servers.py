@@ -464,9 +464,9 @@ def test_a_server_that_is_gone_during_a_print_is_told_of(kind: str, monkeypatch:
             if status.state is PrintState.PRINTING:
                 job.refuse = dict.fromkeys(STATUS, (502, "Bad Gateway"))
 
-        with pytest.raises(ServerError, match="the print may go on, look at the printer"):
+        with pytest.raises(ServerError, match="the print may continue: look at the printer"):
             run(server, Control(), away)
-    assert re.fullmatch("no answer for [0-9]+ s: whether the print goes on there is not known", messages[-1])
+    assert re.fullmatch("no answer for [0-9]+ s: whether the print continues there is unknown", messages[-1])
 
 
 def cancelled_there(job: Job, message: str) -> None:
@@ -488,7 +488,7 @@ def dies_and_comes_back(job: Job, message: str) -> None:
 HAPPENINGS = [
     (KINDS, dies_and_comes_back, r"no longer prints box\.gcode \(ready\); last known: .*nozzle 210 °C, bed 60 °C"),
     (("octoprint", "moonraker"), cancelled_there, r"no longer prints box\.gcode"),
-    (("octoprint", "moonraker"), another_is_printed, r"prints other\.gcode now: what became of box\.gcode is not known"),
+    (("octoprint", "moonraker"), another_is_printed, r"prints other\.gcode now: what happened to box\.gcode is unknown"),
 ]
 
 
@@ -629,13 +629,13 @@ def test_an_answer_without_end_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(http, "MOST_BYTES", 1_000_000)
     with stand_in("octoprint") as (job, address), session_with(address) as server:
         job.refuse["/api/version"] = (200, b"x" * 2_000_000)
-        with pytest.raises(ServerError, match="answers with more than 1 MB: it is no print server"):
+        with pytest.raises(ServerError, match="answers with more than 1 MB: it is not a print server"):
             server.greet()
 
 
 def test_an_answer_that_drips_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(http, "WHOLE_S", -1.0)
-    no_end = pytest.raises(NoAnswerError, match="does not come to the end of its answer")
+    no_end = pytest.raises(NoAnswerError, match="sends an answer without an end")
     with stand_in("octoprint") as (_, address), session_with(address) as server, no_end:
         server.greet()
 
@@ -673,7 +673,7 @@ def test_a_server_whose_answer_never_comes_is_lost_too(monkeypatch: pytest.Monke
     over = threading.Event()
     monkeypatch.setattr(follow, "JOIN_S", 0.01)
     try:
-        with pytest.raises(ServerError, match="octoprint:host; no answer for 0 s: the print may go on, look at the printer"):
+        with pytest.raises(ServerError, match="octoprint:host; no answer for 0 s: the print may continue: look at the printer"):
             follow_unanswered(lambda: PrintStatus(PrintState.READY if over.wait(60.0) else PrintState.FAILED))
     finally:
         over.set()
@@ -688,7 +688,9 @@ def test_a_server_that_answers_nothing_but_errors_is_lost(monkeypatch: pytest.Mo
             return PrintStatus(PrintState.PRINTING, file="box.gcode")
         raise ServerError("octoprint:host refuses") if look < 299 else ZeroDivisionError
 
-    with pytest.raises(ServerError, match="octoprint:host refuses; no answer for 0 s: the print may go on, look at the printer"):
+    with pytest.raises(
+        ServerError, match="octoprint:host refuses; no answer for 0 s: the print may continue: look at the printer"
+    ):
         follow_unanswered(status)
 
 
