@@ -116,12 +116,12 @@ def _head(name: str, source: str, profile: Profile, known: bool) -> dict[str, An
 def _summary(header: dict[str, Any], layers: int | None) -> str:
     """The page in a line: parts, layers (None: no paths), time and filament, and how much of a simplified print there is."""
     parts, thinned = header["parts"], header["thinned"]
-    told = [_many(len(parts), "part")] if any(part["index"] for part in parts) else []
+    phrases = [_many(len(parts), "part")] if any(part["index"] for part in parts) else []
     if layers is not None:
-        told += [_many(layers, "layer"), duration(header["time_s"]), f"{header['filament_mm'] / 1000.0:.2f} m of filament"]
+        phrases += [_many(layers, "layer"), duration(header["time_s"]), f"{header['filament_mm'] / 1000.0:.2f} m of filament"]
     if thinned:
-        told.append(f"thinned: {thinned['kept']:,} of {_many(thinned['rows'], 'move')}")
-    return " · ".join(told)
+        phrases.append(f"thinned: {thinned['kept']:,} of {_many(thinned['rows'], 'move')}")
+    return " · ".join(phrases)
 
 
 def _many(count: int, thing: str) -> str:

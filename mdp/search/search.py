@@ -63,7 +63,7 @@ class SearchRequest:
     plan: planes that are cut first and stay, and zones; parts: greatest number of parts, None for the cheapest; price: time and
     filament of parts, for the rows of the front and the choice between them; without it a search for one part does nothing.
     on_phase is called with a description of each phase outside the stages; on_record with the record of the search, the content
-    of an .npz file.
+    of an .npz file. needs_front: whether rows with more parts than requested are used.
     """
 
     plan: PlanFile = NO_PLAN
@@ -73,11 +73,12 @@ class SearchRequest:
     on_stage: OnStage = lambda stage, beam, best_share, measure: None
     on_phase: Callable[[str], None] = lambda text: None
     on_record: Callable[[bytes], None] | None = None
+    needs_front: bool = True
 
     @property
     def is_whole(self) -> bool:
         """Whether the model stays in one piece and no front is needed."""
-        return self.parts == 1 and self.price is None and self.on_record is None
+        return self.parts == 1 and (self.price is None or not self.needs_front) and self.on_record is None
 
 
 ANY_PARTS = SearchRequest()

@@ -50,7 +50,7 @@ class Watched:
         if self._ended:
             self._end_reported.set()
         status = replace(self._status, state=self._ended) if self._ended else self._status
-        return json.dumps(status.json() | {"told": _told(status)}).encode()
+        return json.dumps(status.json() | {"told": _in_words(status)}).encode()
 
     def end(self, state: PrintState) -> None:
         """Set the final state once, and wait briefly until a page that has polled before receives it."""
@@ -59,7 +59,7 @@ class Watched:
             self._end_reported.wait(LAST_WORD_S)
 
 
-def _told(status: PrintStatus) -> str:
+def _in_words(status: PrintStatus) -> str:
     """How the print is, in one line."""
     heat = status.temperature
     temperatures = [

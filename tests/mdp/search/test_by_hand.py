@@ -148,7 +148,7 @@ def test_a_plane_beside_the_model_is_refused_with_what_it_could_be() -> None:
 
 
 def test_planes_in_an_impossible_order_are_refused() -> None:
-    assert "part 2 cannot be cut off: nothing is left above its plane, the parts printed after it took it" in _refusal(
+    assert "part 2 cannot be cut off: nothing is left above its plane, later parts have taken it: change the order" in _refusal(
         shapes.box(z=40.0), (UP, 30.0), (UP, 20.0)
     )
     assert len(_cut(shapes.box(z=40.0), (UP, 20.0), (UP, 30.0)).parts) == 3
