@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from time import monotonic
 from typing import Protocol
 
-from profiles.messages import terminal_words
+from profiles.messages import is_phrase, terminal_words
 
 # C0 and C1 controls, DEL, bidirectional overrides (CVE-2021-42574), line separators, and surrogates, which stand for undecodable
 # bytes of file names.
@@ -79,9 +79,9 @@ class PlainLines:
 
 @contextmanager
 def as_notices() -> Iterator[Report]:
-    """Report progress as occasional notices."""
+    """Report progress as occasional notices; counted kernels only move a live line, since their beginning is a notice."""
     lines = PlainLines()
-    yield lambda text, share=None: lines.show(text)
+    yield lambda text, share=None: None if is_phrase("compiled", text) else lines.show(text)
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def to_streams(notice: Notice) -> None:
     """Write results to stdout, all else to stderr."""
     stream = sys.stdout if notice.is_result else sys.stderr
     text = terminal_words(notice.text)
-    stream.write(f"{text.rstrip()}; going on because of --force\n" if notice.forced else text)
+    stream.write(f"{text.rstrip()}; continuing because of --force\n" if notice.forced else text)
     stream.flush()
 
 

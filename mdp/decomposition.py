@@ -82,8 +82,7 @@ class FrontRow:
     """A decomposition on the Pareto front: its planes in the order of the cuts, and its cost.
 
     seam_mm: length of the rims of all cuts; stairs_mm2: cost of the stair-stepping of all parts; time_s, filament_mm: estimates,
-    None if not estimated; reason: why it was chosen; sound: whether its joints bear the nozzle's push, no cut passes through the
-    bulk of the model, and the first part is not a sliver.
+    None if not estimated; reason: why it was chosen; flaw: why it is chosen only on request, empty if nothing speaks against it.
     """
 
     planes: tuple[Plane, ...]
@@ -95,7 +94,7 @@ class FrontRow:
     filament_mm: float | None = None
     reason: str = ""
     stairs_mm2: float = 0.0
-    sound: bool = True
+    flaw: str = ""
 
     @property
     def parts(self) -> int:

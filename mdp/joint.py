@@ -79,19 +79,22 @@ def weakest_of(joints: Sequence[Joint]) -> Joint | None:
     return min(joints, key=lambda joint: joint.load_n, default=None)
 
 
-def is_sound(mesh: Mesh, parts: Sequence[Part], profile: Profile, by_hand: int = 0) -> bool:
-    """Whether a decomposition is sound: no joint breaks when the nozzle pushes the far end of what it holds, no cut passes
-    through the bulk of the model, where its seam would surround the whole model, and the first part is not a sliver. Always true
-    on the paper's terms, which have none of these. by_hand: number of last parts that the user cut off; these are not tested.
+def flaw_of(mesh: Mesh, parts: Sequence[Part], profile: Profile, by_hand: int = 0) -> str:
+    """The flaw of a decomposition in words: a joint breaks when the nozzle pushes the far end of what it holds, the first part is
+    a sliver, or a cut passes through the bulk of the model, where its seam would surround the whole model. Empty if it is sound,
+    and on the paper's terms, which have none of these. by_hand: number of last parts that the user cut off; these are not tested.
     """
     search = profile.search.effective
     if search.seam_mm <= 0.0:
-        return True
+        return ""
     end, most_mm2 = len(parts) - by_hand, BULK * diameter_mm(mesh) ** 2
     weakest = weakest_of(joints_of(parts, profile)[: end - 1])
-    firm = weakest is None or weakest.load_n >= search.strength_safety * search.nozzle_load_n
-    large = end == 1 or parts[0].volume_mm3 >= FIRST * sum(part.volume_mm3 for part in parts[:end])
-    return firm and large and all(_base_hull_mm2(part) <= most_mm2 for part in parts[1:end])
+    if weakest is not None and weakest.load_n < search.strength_safety * search.nozzle_load_n:
+        return f"the nozzle could break off part {weakest.part}"
+    if end > 1 and parts[0].volume_mm3 < FIRST * sum(part.volume_mm3 for part in parts[:end]):
+        return "the first part is too small to carry the others"
+    thick = next((part.index for part in parts[1:end] if _base_hull_mm2(part) > most_mm2), None)
+    return "" if thick is None else f"the cut below part {thick} surrounds the whole model"
 
 
 def _base_hull_mm2(part: Part) -> float:

@@ -41,7 +41,7 @@ def plan_beside(model: str) -> Path | None:
 def check_file(path: Path) -> None:
     """Refuse a path that cannot be a model file before any work is done. Raises MeshError."""
     if os.path.isdir(path):  # unlike pathlib's, false for a name that is too long to exist
-        raise MeshError(f"{path}: is a folder, not a model file")
+        raise MeshError(f"{path} is a folder, not a model file")
     if not os.path.exists(path):
         raise MeshError(f"{path}: there is no such file")
     if path.suffix.lower() not in READERS:

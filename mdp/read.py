@@ -1,5 +1,6 @@
 """Read: a model file as one closed solid in mm that rests on the build plate, centred about the turn axis."""
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -28,6 +29,7 @@ SMALL_MM = 10.0  # a model of a smaller extent may be in another unit
 INCH_MM, METRE_MM = 25.4, 1000.0
 TYPICAL_MM = 100.0  # among several fitting units, the one that brings the model nearest to this size is proposed
 MANY_FACES = 500_000  # more do not improve a print: with edges of 0.2 mm they cover an area of 90 cm2
+PREDICATE = re.compile(r"(is|has|encloses|cannot) ")  # begins errors of repair
 MOST_BYTES = 2**30  # of a file: twenty million facets of a binary STL
 
 
@@ -83,7 +85,7 @@ def read_model(
     except SizeError as error:
         raise SizeError(f"{path}: {error}", f"{path}: {error.question}", error.units) from None
     except MeshError as error:
-        raise MeshError(f"{path}: {error}") from None
+        raise MeshError(_named(path, f"{error}")) from None
     left_out = (note for surface in surfaces for note in surface.notes)
     size = small(mesh, path.suffix.lower(), any(rotate_deg)) if scale == 1.0 else ()
     notes = (*build.notes, *taken, *mark_notes, *size, *left_out, *repairs, *floating_pieces(mesh), *too_fine(mesh))
@@ -96,8 +98,13 @@ def read_in_place(path: Path) -> Mesh:
         solid, _ = repair(printed(_read_build(path))[0])
     except MeshError as error:
         text = f"{error}"
-        raise MeshError(text if text.startswith(str(path)) else f"{path}: {text}") from None
+        raise MeshError(text if text.startswith(str(path)) else _named(path, text)) from None
     return Mesh(solid.vertices, solid.faces.astype(np.int32))
+
+
+def _named(path: Path, text: str) -> str:
+    """An error as a sentence about a file; text: a predicate ("is not closed") or a sentence."""
+    return f"{path} {text}" if PREDICATE.match(text) else f"{path}: {text}"
 
 
 def small(mesh: Mesh, suffix: str, turned: bool) -> tuple[str, ...]:
@@ -154,12 +161,12 @@ def _read_build(path: Path, plate: int | None = None) -> Build:
     try:
         size = path.stat().st_size
         if size == 0:
-            raise MeshError(f"{path}: is empty")
+            raise MeshError(f"{path} is empty")
         if size > MOST_BYTES:
-            raise MeshError(f"{path}: has {size} bytes, at most {MOST_BYTES} are read: a model of fewer faces is needed")
+            raise MeshError(f"{path} has {size} bytes, at most {MOST_BYTES} are read: a model of fewer faces is needed")
         return READERS[path.suffix.lower()](path, plate)
     except OSError as error:
-        raise MeshError(f"{path}: cannot be read: {error.strerror or error}") from None
+        raise MeshError(f"{path} cannot be read: {error.strerror or error}") from None
 
 
 def _check_size(surfaces: list[Surface], scale: float) -> None:

@@ -36,6 +36,11 @@ def phrase(name: str, terminal: str, value: object = "") -> str:
     return _mark(name, f"{value}", terminal)
 
 
+def is_phrase(name: str, message: str) -> bool:
+    """Whether a message is a phrase of this name."""
+    return message.startswith(f"{_BEGIN}{name}{_BETWEEN}")
+
+
 def settings_in(message: str) -> list[str]:
     """The settings KEY=VALUE that a message names as options."""
     return [value for name, value, _ in _MARK.findall(message) if name.endswith("--set")]

@@ -1,5 +1,6 @@
 """Part settings: values that one part of a print, or a volume of it, uses in place of the process's own."""
 
+import re
 from collections.abc import Iterable
 from typing import Any
 
@@ -105,10 +106,12 @@ def parse_part_settings(text: str) -> PartSettings:
     number, colon, rest = text.partition(":")
     pairs = [pair.partition("=") for pair in rest.split(",")]
     known = colon and number.strip().isascii() and number.strip().isdigit() and 1 <= int(number.strip()[:9]) <= MOST_PARTS
+    comma = re.search(r"=-?\d+,\d+(?=,|$)", rest)
+    point = comma[0].replace(",", ".") if comma else ""
     if not known or not all(key.strip() and equals and value.strip() for key, equals, value in pairs):
         raise ProfileError(
             f"{option('part', text)}: PART:KEY=VALUE,... is expected, such as 2:walls=4,infill_density=40%; "
-            f"PART is 1 to {MOST_PARTS}"
+            f"PART is 1 to {MOST_PARTS}{'; numbers have a decimal point: ' + text.replace(comma[0], point) if comma else ''}"
         )
     values = {key.strip().removeprefix("process."): read_value(value.strip()) for key, _, value in pairs}
     return PartSettings(part=int(number), process=values)

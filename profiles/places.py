@@ -71,9 +71,9 @@ def tables(kind: str, name: str, seen: tuple[str, ...] = ()) -> dict[str, Any]:
     """The tables of a profile, given by name or path, with inherited ones. Raises ProfileError if there is no such profile."""
     document, source = _document(kind, name, seen)
     if source in seen:
-        raise ProfileError(f"{name} inherits itself by way of {', '.join(seen[seen.index(source) + 1 :]) or 'its own name'}")
+        raise ProfileError(f"{name} inherits itself through {', '.join(seen[seen.index(source) + 1 :]) or 'its own name'}")
     if len(seen) >= MOST_INHERITED:
-        raise ProfileError(f"{name} is inherited by way of {len(seen)} profiles: at most {MOST_INHERITED} are allowed")
+        raise ProfileError(f"{name} is inherited through {len(seen)} profiles: at most {MOST_INHERITED} are allowed")
     problem = strangers(kind, name, document)
     if problem:
         raise ProfileError(problem)

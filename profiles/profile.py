@@ -191,7 +191,9 @@ def _apply(whole: dict[str, Any], setting: str) -> None:
     steps = key.strip().split(".")
     if not equals or len(steps) < 2 or steps[0] not in SECTIONS or not all(steps):
         begins = ", ".join(f"{section}." for section in SECTIONS)
-        raise ProfileError(f"{option('set', setting)}: KEY=VALUE is expected, where KEY begins with one of {begins}")
+        meant = next((f"{name}.{steps[0]}" for name, model in SECTIONS.items() if steps[0] in model.model_fields), "")
+        hint = f"; did you mean {meant}?" if equals and meant else ""
+        raise ProfileError(f"{option('set', setting)}: KEY=VALUE is expected, where KEY begins with one of {begins}{hint}")
     value = read_value(text.strip())
     table = whole
     for step in steps[:-1]:

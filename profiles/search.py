@@ -35,7 +35,7 @@ class Search(Frozen):
     beam_width: int = advanced("Beam width", "thoroughness search effort", ge=1, le=1000)(4, "decompositions followed at a time")
     objective: Literal["scar", "risky"] = rare("What is made small")(
         "scar",
-        "scar: area of support and of cut seams, each as wide as its scar; risky: the area alone, the terms of the 2020 paper",
+        "scar minimises support, seams, cuts, stair-stepping and bores, risky the area that needs support alone, as published",
     )
     seam_mm: float = advanced("Width of a cut's scar", "seam weight", ge=0, le=100)(
         5.0,
@@ -92,10 +92,10 @@ class Search(Frozen):
         True, "improve the best results of a beam of two or more: remove, move and add cuts"
     )
     least_volume_share: float = advanced("Smallest part", "minimum volume", ge=0, lt=1)(
-        0.02, "least share of the model's volume in a part (criterion IV, published: 10 %)"
+        0.02, "least share of the model's volume in a part, criterion IV (published: 10 %)"
     )
     preferred_volume_share: float = rare("Smallest part that is preferred", "minimum volume", ge=0, lt=1)(
-        0.1, "criterion IV as a preference: the classic ranking takes parts of at least this share of the volume first"
+        0.1, "share of the volume from which the classic ranking takes parts first; smaller ones are allowed"
     )
     least_interface_mm2: float = advanced("Smallest face a part stands on", "minimum area", ge=0, le=1e6)(
         4.0, "least area under a part and its pieces, mm²; fragments are not counted"
@@ -128,7 +128,7 @@ class Search(Frozen):
         0.002, "least share of the risky area that a cut makes safe; faces on the build plate are not counted"
     )
     least_gain_preferred: float = rare("Least share a preferred cut makes safe", ge=0, le=1)(
-        1e-4, "least_gain for parts of the preferred volume in the classic ranking (published: 0.01 %)"
+        1e-4, "least_gain for parts of the preferred volume (classic ranking; published: 0.01 %)"
     )
     platform_radius_mm: float | None = rare("Radius that planes must clear", gt=0)(
         None, "radius of the disc that planes must clear (criterion III); absent: the model's footprint"

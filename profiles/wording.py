@@ -17,7 +17,7 @@ from profiles.messages import key_name, phrase
 LONGEST_VALUE = 60
 KEY = re.compile(r"\b[a-z][a-z0-9]*_\w+")
 ONE_OF, NAME_OF = re.compile(r"\^\[(\w+)\]\$"), re.compile(r"\^\[([^\]]+)\]\*\$")
-DECIMAL_COMMA = re.compile(r"\d+,\d+")
+DECIMAL_COMMA = re.compile(r"-?\d+,\d+")
 KINDS = (("A-Za-z", "letters"), ("0-9", "digits"))
 
 
@@ -73,7 +73,13 @@ def _sentence(problem: Any, text: str, root: type[BaseModel], prefix: str) -> st
     if field and unit_of(key) == "%":
         return f"{key_name(key)} is {_share_problem(problem['input'], field)}"
     expected = allowed(field) if field else "a table of keys"
-    return f"{key_name(key)} is {_shown(problem['input'])}: it must be {expected}"
+    return f"{key_name(key)} is {_shown(problem['input'])}: it must be {expected}{decimal_hint(problem['input'])}"
+
+
+def decimal_hint(given: Any) -> str:
+    """Hint to write a number with a decimal point instead of a comma; "" for any other value."""
+    text = given.strip() if isinstance(given, str) else ""
+    return f": write {text.replace(',', '.')}" if DECIMAL_COMMA.fullmatch(text) else ""
 
 
 def _share_problem(given: Any, field: FieldInfo) -> str:

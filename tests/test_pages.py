@@ -36,6 +36,7 @@ PARSED_WITH = (
     "jog by keys",
     "--measured",
     "piece.gcode",
+    "--plate",
 )
 # A process of its own name in the user's folder makes every print small and quick.
 QUICK = """inherits = "standard"
@@ -77,6 +78,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "my.toml").write_text('inherits = "generic_ac"\n\n[machine]\nlift_mm = 12.0\n')
     (tmp_path / "config.ini").write_text("; PrusaSlicer\nlayer_height = 0.2\nperimeters = 2\nnozzle_diameter = 0.4\n")
     (tmp_path / "faults.toml").write_text("seed = 7\n")
+    (tmp_path / "marks.toml").write_text("version = 1\n")
     return tmp_path
 
 

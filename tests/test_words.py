@@ -50,6 +50,13 @@ WORDS = {
     r"\bmends?\b": "repair, fix, replace",
     r"(?<!there )\b(is|are) no (?!\w+er\b|more\b|less\b|such\b|room\b)": "is not a, are not",
     r"\bby way of\b": "through, via",
+    r"\brubbish\b|\bhopeless\b": "garbled bytes; unavoidable",
+    r"\bwhat stands\b": "the bodies beside, the print",
+    r"\b(answers?|improves?|comes?|goes|follows?|moves?) no more\b": "no longer",
+    r"\bof the \w+ have (one|two|no|none)\b": "a subject: turns have one point",
+    r"\bgoing on\b|\bgone on\b": "continue, proceed",
+    r"\bmended\b|\bparted\b": "repaired, split",
+    r"\bdoes not tell\b": "does not say, state or report",
 }
 
 CODE = re.compile(r"`[^`]*`|\w+(?:/\w+)*\.cpp")  # names are checked where they are defined

@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -34,16 +35,14 @@ def export(
     """Write the G-code of one or several models. A dry run checks it first."""
     for model in dict.fromkeys(options.named_models(models)):
         options.check_model(model)
-    from machine.cli.commands.export import default_gcode, export
+    from machine.cli.commands.export import default_gcode, export, folder_line
 
-    outputs = Outputs(
-        gcode=out or default_gcode(options.named_models(models)[0]),
-        json=asked.json,
-        html=asked.html,
-        svg=asked.svg,
-        layer=asked.layer,
-    )
-    return export(options.program_request(models, program, given, outputs=outputs, compare=asked.compare, force=asked.force))
+    outputs = Outputs(gcode=out, json=asked.json, html=asked.html, svg=asked.svg, layer=asked.layer)
+    request = options.program_request(models, program, given, outputs=outputs, compare=asked.compare, force=asked.force)
+    if out is not None:
+        return export(request)
+    model = options.named_models(models)[0]
+    return export(replace(request, outputs=replace(outputs, gcode=default_gcode(model, request))), folder_line(model))
 
 
 def simulate(
@@ -305,11 +304,12 @@ def save_profile(
     name: ProfileName,
     out: Annotated[Path, option("-o --out FILE.toml", "profile to write, for --machine and the like")],
     settings: options.Settings = (),
+    replace: requests.Replace = False,
 ) -> int:
     """Save a profile with your changes as your own. It contains the differences and inherits the rest."""
     from machine.cli.commands.profiles.listing import save
 
-    return save(name, settings, out)
+    return save(name, settings, out, replace)
 
 
 def import_(asked: requests.ImportRequest) -> int:

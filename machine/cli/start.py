@@ -50,3 +50,7 @@ def package_trouble() -> str:
         if not own:
             return f"{folder} belongs to another program"
     return ""
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -185,7 +185,7 @@ def _flow(program: ParsedProgram, profile: Profile) -> Iterable[Finding]:
     for some in pieces(len(flow)):
         flow[some] = program.e_mm[some] * area / (program.ways_mm(some) + ROUNDING_MM) * program.feed[some] / 60.0
     most = material.volumetric_limit_mm3_s
-    message = f"{{value}} mm³/s are asked for, {material.name} allows {most:g} mm³/s (moves: {{count}})"
+    message = f"the flow is {{value}} mm³/s, {material.name} allows {most:g} mm³/s (moves: {{count}})"
     much = np.flatnonzero((program.kind == MoveKind.EXTRUDE) & (flow > most * SLACK))
     return per_part(program, much, flow[much], message, code="flow", severity="warning")
 

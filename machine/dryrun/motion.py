@@ -92,7 +92,7 @@ def _too_fast(program: ParsedProgram, machine: Machine) -> Iterator[Finding]:
     rows, speeds = np.concatenate(fast), np.concatenate(asked)
     for axis, letter in enumerate([*axis_limits(machine), "E"]):
         unit = "deg/s" if axis in (3, 4) else "mm/s"
-        message = f"{letter} is asked for {{value}} {unit}, the firmware will slow it to {most[axis]:g} {unit} (moves: {{count}})"
+        message = f"{letter} is programmed at {{value}} {unit}: the firmware slows it to {most[axis]:g} {unit} (moves: {{count}})"
         too_fast = speeds[:, axis] > allowed[axis]
         yield from per_part(program, rows[too_fast], speeds[too_fast, axis], message, code="axis-speed", severity="warning")
 

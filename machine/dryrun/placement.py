@@ -37,7 +37,7 @@ def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> It
     yield from _in_air(program, length, contacts)
     yield from _in_plastic(program, length, contacts)
     if contacts.untested_row >= 0:
-        message = "the table turns too often: from here on no move was tried against earlier plastic"
+        message = "the table turns too often: later moves were not tested against earlier plastic"
         yield at_row(program, contacts.untested_row, "warning", "not-tested", message)
 
 

@@ -75,9 +75,12 @@ class Feed:
     def run(self, lines: Iterable[str], resume_point: ResumePoint | None = None) -> None:
         """Feed the program from its beginning, or from the resume point of an interrupted print, to the final barrier."""
         exchange = self.exchange
-        self.started, self.history = True, self._new_history()
         if not exchange.connection.greeting.capabilities.get("BABYSTEPPING", True):
             self.pending.babystep = ""
+        if resume_point is not None and resume_point.z_offset_mm and not self.pending.babystep:
+            offset = f"{resume_point.z_offset_mm:+g} mm"
+            raise PrinterError(f"the print had a Z offset of {offset}, which this firmware cannot set: nothing was moved")
+        self.started, self.history = True, self._new_history()
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send(f"M155 S{REPORT_S}")
         for line, command in self._commands(lines):
@@ -96,13 +99,16 @@ class Feed:
 
     def _approach(self, resume_point: ResumePoint) -> None:
         """Send the commands before the first line of a resumed print, and check them by the printer's position."""
+        self.pending.z_offset_mm = self.pending.sent_offset_mm = resume_point.z_offset_mm
         self.set_state(PrintState.RESUMING)
         self.history = self._new_history(resume_point.line - 1)
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
         self._record()
-        for command in resume_point.before:
+        # A printer that has not restarted may keep what the user set before the interruption.
+        overrides = f"M220 S{self.pending.feed_percent:g}", f"M221 S{self.pending.flow_percent:g}"
+        for command in (*overrides, *resume_point.before):
             self.exchange.send(command)
-        self._verify_position("before the print goes on")
+        self._verify_position("before the print continues")
         self.set_state(PrintState.PRINTING)
 
     def _skip(self, command: str) -> None:
@@ -143,6 +149,7 @@ class Feed:
         """Do what is due before the next command of the program."""
         if self.pending.lines:
             for own in self.pending.next_lines(self.modal):
+                self._record()  # it holds the Z offset that this line may change
                 self.exchange.send(own)
         if self._reconnected:
             self._reconnected = False
@@ -320,7 +327,8 @@ class Feed:
         number = self.exchange.connection.window.wire_number(history.number)
         # while heating again or without a port the tip still waits
         state = PrintState.DONE if self.finished else PrintState.PAUSED if waits is not None else self.state
-        return Checkpoint(history.sent, history.acknowledged, history.executed, number, waits or history.pose, state)
+        z_offset_mm = round(self.pending.sent_offset_mm, 3)
+        return Checkpoint(history.sent, history.acknowledged, history.executed, number, waits or history.pose, state, z_offset_mm)
 
     def _record(self, hurry: bool = False) -> None:
         if self._journal is not None:
@@ -339,7 +347,7 @@ class Feed:
         self._on_progress(
             PrintStatus(
                 sent=self.sent, acknowledged=done, total=self._total, elapsed_s=elapsed_s,
-                left_s=at.left_s(elapsed_s, feed_percent),
+                left_s=None if self.state is PrintState.CANCELLING else at.left_s(elapsed_s, feed_percent),
                 share=at.share(done, self._total),
                 temperature=self.reports.temperature, heat_age_s=now_s - self.reports.temperature_s,
                 part=at.part, parts=at.parts, layer=at.layer,

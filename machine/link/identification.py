@@ -33,7 +33,7 @@ class Kind(Enum):
     STARTING = "starting printer"
     HALTED = "halted printer"
     STRANGER = "no printer"
-    RUBBISH = "rubbish"
+    GARBLED = "garbled"
     SILENT = "silent"
 
     @property
@@ -75,7 +75,7 @@ def ask_at_any_rate(port: Port, baud: int, timeout_s: float = TIMEOUT_S, stop: F
     If no rate finds a printer, the answer is that at the given rate, and the port keeps that rate.
     """
     first = ask(port, timeout_s, stop)
-    if first.kind not in (Kind.RUBBISH, Kind.SILENT) or port.name.startswith("socket://"):
+    if first.kind not in (Kind.GARBLED, Kind.SILENT) or port.name.startswith("socket://"):
         return first, baud
     for rate in BAUDS:
         if rate != baud:
@@ -130,8 +130,8 @@ class _Inquiry:
             return Answer(Kind.PRINTER, self._words, self._letters, self._limits())
         if self._busy:
             return Answer(Kind.BUSY, self._busy)
-        if self._orders.decoder.rubbish:
-            return Answer(Kind.RUBBISH)
+        if self._orders.decoder.is_garbled:
+            return Answer(Kind.GARBLED)
         words = self._orders.decoder.foreign
         return Answer(Kind.STRANGER, words) if words else Answer(Kind.SILENT)
 

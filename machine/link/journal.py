@@ -72,6 +72,7 @@ class Checkpoint:
     # X Y Z tilt turn E after the acknowledged line, unwrapped, or of a tip that has left the print; None: unknown.
     pose: tuple[float | None, ...] = ()
     state: PrintState = PrintState.PRINTING
+    z_offset_mm: float = 0.0  # of the user, as sent to the firmware
     continued_in: str | None = None  # the journal of the run that resumed the print
 
 
@@ -296,7 +297,9 @@ def _slot(number: int, checkpoint: Checkpoint) -> bytes:
     """The record of a checkpoint."""
     lines = [checkpoint.sent, checkpoint.acknowledged, checkpoint.executed, checkpoint.number]
     state, rest = checkpoint.state, checkpoint.continued_in
-    return _record([number, *lines, checkpoint.pose, WORDS.get(state, state) if rest is None else f"{RESUMED}{rest}"])
+    word = WORDS.get(state, state) if rest is None else f"{RESUMED}{rest}"
+    offset = (checkpoint.z_offset_mm,) if checkpoint.z_offset_mm else ()  # earlier versions know none, and refuse such a record
+    return _record([number, *lines, checkpoint.pose, word, *offset])
 
 
 def read_journal(path: Path) -> JournalContents:
@@ -306,7 +309,7 @@ def read_journal(path: Path) -> JournalContents:
         raise _incomplete(path)
     values = _value(first)
     if values is None:
-        raise JournalError(f"{path} is no journal of a print: its first line is not the heading of one")
+        raise JournalError(f"{path} is not the journal of a print: its first line is not a journal's heading")
     heading, key, boot = _heading(path, values)
     if is_noted_incomplete(key):
         raise _incomplete(path)
@@ -320,15 +323,15 @@ def read_journal(path: Path) -> JournalContents:
 
 def _incomplete(path: Path) -> JournalError:
     return JournalError(
-        f"journal {path} is incomplete: its print went on when the journal could not be written any more, so nobody knows how "
-        "far it came, and it cannot be resumed"
+        f"journal {path} is incomplete: its print continued after the journal could no longer be written: how far it came is "
+        "unknown, and it cannot be resumed"
     )
 
 
 def _read(path: Path) -> tuple[bytes, list[bytes]]:
     """The heading, and the blocks of the records."""
     if lexists(path) and not isfile(path) and not isdir(path):  # reading a pipe would block
-        raise JournalError(f"journal {path} cannot be read: it is no file")
+        raise JournalError(f"journal {path} cannot be read: it is not a file")
     try:
         with path.open("rb") as file:
             first, slots = _blocks(file)
@@ -361,14 +364,16 @@ def _heading(path: Path, value: Any) -> tuple[JournalHeading, str, str]:
         case {"key": str(key), "boot": str(boot), "program": str(program), "sha256": str(sha256), "name": str(name),
               "profile": dict(profile)} if key.isascii() and key.isalnum():  # fmt: skip
             return JournalHeading(program, sha256, name, profile), key, boot
-    raise JournalError(f"journal {path} is damaged: its heading does not tell program and profile")
+    raise JournalError(f"journal {path} is damaged: its heading lacks the program or the profile")
 
 
 def _checkpoint(path: Path, value: Any, slot: int) -> tuple[int, Checkpoint]:
     """Number and content of a record."""
     match value:
-        case [int(number), int(sent), int(acknowledged), int(executed), int(wire), list(pose), str(word)] if _is_pose(pose):
-            at = Checkpoint(sent, acknowledged, executed, wire, tuple(pose))
+        case [int(number), int(sent), int(acknowledged), int(executed), int(wire), list(pose), str(word), *offset] if _is_pose(
+            pose
+        ) and _is_offset(offset):
+            at = Checkpoint(sent, acknowledged, executed, wire, tuple(pose), z_offset_mm=sum(offset))
             if word.startswith(RESUMED):
                 return number, replace(at, continued_in=word.removeprefix(RESUMED))
             if word in STATES:
@@ -378,6 +383,11 @@ def _checkpoint(path: Path, value: Any, slot: int) -> tuple[int, Checkpoint]:
 
 def _is_pose(values: list[Any]) -> bool:
     return all(value is None or (isinstance(value, int | float) and abs(value) < BEYOND_MM) for value in values)
+
+
+def _is_offset(values: list[Any]) -> bool:
+    """Whether the end of a record is a Z offset, or absent."""
+    return len(values) <= 1 and None not in values and _is_pose(values)
 
 
 def write_at(descriptor: int, offset: int, data: bytes) -> None:

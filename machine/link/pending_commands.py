@@ -136,6 +136,7 @@ class PendingCommands:
             before, _, after = self.babystep.partition("{}")
             if self.babystep and command.startswith(before) and command.endswith(after):
                 self.sent_offset_mm += float(command.removeprefix(before).removesuffix(after))
+            self.note_override(command)
             yield command
             if not command_in(command).moves:
                 modal.take(command)
@@ -145,7 +146,7 @@ class PendingCommands:
         self.pause_s, self.resume = None, False
 
     def note_override(self, command: str) -> None:
-        """Note an M220 or M221 of the program itself; no firmware accepts 0."""
+        """Note an M220 or M221 of the program or the user; no firmware accepts 0."""
         name, rest = split_command(command.upper())
         value = dict(read_words(rest)).get("S", 0.0) if name in ("M220", "M221") else 0.0
         if value > 0 and name == "M220":
@@ -155,19 +156,14 @@ class PendingCommands:
 
     def undo_overrides(self) -> list[str]:
         """Commands that reset the sent overrides, which the firmware would keep for the next print."""
-        pairs = (("M220", self.feed_percent), ("M221", self.flow_percent))
-        undone = [f"{name} S100" for name, value in pairs if value != 100.0]
+        undone = percents_undone(self.feed_percent, self.flow_percent)
         offset_mm = round(self.sent_offset_mm, 3)
         return [*undone, offset_undone(offset_mm, self.babystep)] if offset_mm else undone
 
     @property
-    def kept_offset(self) -> str:
-        """A sentence on a Z offset that the firmware keeps for the next print if this one stops now; "" for none."""
-        offset_mm = round(self.sent_offset_mm, 3)
-        if not offset_mm or not self.babystep.endswith(KEEPS_OFFSET):
-            return ""
-        undone = offset_undone(offset_mm, self.babystep)
-        return f"the printer keeps the Z offset of {offset_mm:+g} mm: before another print send it {undone}"
+    def kept(self) -> str:
+        """A sentence on the settings that the firmware keeps for the next print if this one stops now; "" for none."""
+        return kept_settings(self.feed_percent, self.flow_percent, round(self.sent_offset_mm, 3), self.babystep)
 
     def _queue_line(self, text: str, state: PrintState) -> None:
         why = line_refusal(text, self.axes, state is PrintState.PAUSED, self.limit)
@@ -214,6 +210,23 @@ def offset_undone(offset_mm: float, babystep: str) -> str:
     return babystep.format(f"{-offset_mm:.3f}").removesuffix(KEEPS_OFFSET)
 
 
+def percents_undone(feed_percent: float, flow_percent: float) -> list[str]:
+    """The commands that set feed and flow back to 100 %."""
+    return [f"{name} S100" for name, value in (("M220", feed_percent), ("M221", flow_percent)) if value != 100.0]
+
+
+def kept_settings(feed_percent: float, flow_percent: float, offset_mm: float, babystep: str) -> str:
+    """A sentence on the user's settings that a firmware keeps for the next print, with the commands that undo them; "" for none.
+    Every firmware keeps feed and flow; babystep: its command for a Z offset, which most reset by homing."""
+    undone = percents_undone(feed_percent, flow_percent)
+    percents = (("feed", feed_percent), ("flow", flow_percent))
+    settings = [f"the {name} of {value:g} %" for name, value in percents if value != 100.0]
+    if offset_mm and babystep.endswith(KEEPS_OFFSET):
+        undone.append(offset_undone(offset_mm, babystep))
+        settings.append(f"the Z offset of {offset_mm:+g} mm")
+    return f"the printer keeps {' and '.join(settings)}: before another print send it {' and '.join(undone)}" if undone else ""
+
+
 def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:
     """Why the user's command may not be sent now; None when it may.
 
@@ -229,7 +242,7 @@ def line_refusal(text: str, axes: Axes, paused: bool, limit: int) -> str | None:
     if row.homes or row.moves == "table" or row.probes:
         return f"{name} homes, probes or turns an axis: the tip may stand inside the print"
     if row.motors:
-        return f"{name} lets the motors go: the print would lose its place"
+        return f"{name} switches the motors: the print would lose its position"
     if row.changes:
         return f"{name} changes what the rest of the program means"
     if row.moves and not (paused and _filament_only(command)):

@@ -14,12 +14,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from machine.firmware import dialect_of
 from machine.gcode.modes import E_AXIS, ModalState, axes_of
 from machine.kinematics.collision import Printed
 from machine.link.journal import EVERY_LINES, Checkpoint
 from machine.link.line_history import shifts
 from machine.link.pause.park_moves import axis_position, filament_commands, heat_commands, homed_return_moves, return_moves
 from machine.link.pause.printed_bounds import PrintedBounds
+from machine.link.pending_commands import KEEPS_OFFSET
 from machine.link.print_state import PrintState, ProgramPosition
 from machine.link.protocol.framing import command_of
 from machine.link.status import SEVERAL, PrinterStatus
@@ -31,11 +33,11 @@ from profiles.machine import Machine
 from profiles.messages import key_name, option, phrase
 from profiles.profile import Profile
 
-TOO_LITTLE = "hardly anything was printed: the program begins anew"
+TOO_LITTLE = "hardly anything was printed: the program begins again"
 PARKED = (PrintState.PAUSED, PrintState.CANCELLED)  # states in which the journal's pose is the parking position
 MOVING = (PrintState.PAUSING, PrintState.RESUMING)
 HOME_IT = (
-    f"write into {key_name('machine.gcode.resume')} of a profile of this machine how it is homed with a print on it "
+    f"state in {key_name('machine.gcode.resume')} of a profile of this machine how it is homed with a print on it "
     "(docs/serial.md), and name "
     f"that profile {phrase('homed as in', 'with --machine')}"
 )
@@ -63,6 +65,7 @@ class ResumePoint:
     before: tuple[str, ...]  # commands before it
     reason: str = ""  # in words
     homes: bool = False  # X and Y
+    z_offset_mm: float = 0.0  # that the firmware has after these commands
 
 
 @dataclass(frozen=True)
@@ -125,26 +128,36 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
         raise FirmwareError(FAULTY.format(status.fault))
     if status.position is None and status.last_number is None:
         raise SilenceError(NO_ANSWER)
+    offset_mm, babystep = point.checkpoint.z_offset_mm, dialect_of(profile.machine).babystep
     alive = has_not_restarted(point, status)
     begun = stands_as_begun(status, profile.machine)
     standing = _match_position(point, status) if alive or not (begun or status.greeted) else None
     if standing is not None:
         line, modal = standing
         before = (*heat_commands(modal, profile), *modal.lines())
-        return ResumePoint(line + 1, before, "the printer stands where this line begins: nothing is repeated")
+        reason = f"the printer stands where this line begins: nothing is repeated{_offset_in_words(offset_mm)}"
+        return ResumePoint(line + 1, before, reason, z_offset_mm=offset_mm)
     if not point.stroked:
-        return ResumePoint(1, (), f"{TOO_LITTLE}, clear the table of the little there may be")
+        # homing resets the offset in most firmwares
+        held_mm = offset_mm if babystep.endswith(KEEPS_OFFSET) and not (begun or status.greeted) else 0.0
+        words = _offset_in_words(held_mm) if held_mm or not offset_mm else f"; set its Z offset of {offset_mm:+g} mm again"
+        return ResumePoint(1, (), f"{TOO_LITTLE}, clear the plate first{words}", z_offset_mm=held_mm)
     _check(point, profile)
     span = f"lines {point.line} to {point.last} may have been printed already"
     at = _reported_position(point, status) if alive or (alive is None and not begun) else None
     if at is not None and not status.greeted:
-        return ResumePoint(
-            point.line, _approach(point, profile, *at), f"the printer has not restarted and knows its place; {span}"
-        )
+        reason = f"the printer has not restarted and knows its place; {span}{_offset_in_words(offset_mm)}"
+        return ResumePoint(point.line, _approach(point, profile, *at), reason, z_offset_mm=offset_mm)
     if not status.greeted:
         _check_begun(status, begun)
     before = _approach(point, profile, *position_at_interruption(point, profile), homes=True)
-    return ResumePoint(point.line, before, f"the printer has restarted; {span}", homes=True)
+    words = f"; its Z offset of {offset_mm:+g} mm is set again" if offset_mm else ""
+    return ResumePoint(point.line, before, f"the printer has restarted; {span}{words}", homes=True, z_offset_mm=offset_mm)
+
+
+def _offset_in_words(offset_mm: float) -> str:
+    """The Z offset that a running printer still has, for the question whether to continue."""
+    return f"; it must still have the Z offset of {offset_mm:+g} mm: if you have undone that, answer no" if offset_mm else ""
 
 
 def _check_begun(status: PrinterStatus, begun: bool) -> None:
@@ -152,7 +165,7 @@ def _check_begun(status: PrinterStatus, begun: bool) -> None:
     if not begun:
         keys = ", ".join(f"{key_name(f'machine.{key}')}" for key in HOME_KEYS)
         raise JournalError(
-            f"the printer's line numbers have begun anew, but it says that it stands at {_in_words(status)}: "
+            f"the printer's line numbers have restarted, but it reports the position {_in_words(status)}: "
             "it was homed or moved since; switch it off and on, move nothing, and resume again. "
             "If it says the same place then, that is where its firmware "
             f"starts: write it as {keys} into a profile of this machine and name that {phrase('homed as in', 'with --machine')}"
@@ -167,10 +180,10 @@ def _check_begun(status: PrinterStatus, begun: bool) -> None:
 def _check(point: InterruptedPrint, profile: Profile) -> None:
     missing = [letter for letter, value in zip("XYZ", point.modal.at[:3], strict=True) if value is None]
     if missing:
-        raise JournalError(f"line {point.line}: the program does not tell where {' '.join(missing)} stand: it cannot go on there")
+        raise JournalError(f"line {point.line}: where {' '.join(missing)} stand is unknown: the print cannot continue there")
     if profile.machine.coordinates == "workpiece":
         raise JournalError(
-            f"{profile.machine.name} follows the table by itself: its print can only go on while the printer still stands in it"
+            f"{profile.machine.name} follows the table by itself: its print can continue only if the printer has not moved since"
         )
 
 
@@ -246,35 +259,37 @@ def _approach(point: InterruptedPrint, profile: Profile, at: Floats, pose: Pose,
     pull, push = filament_commands(point.modal, profile)
     heat, way = (*heat_commands(point.modal, profile), *pull, "G90"), Turn(pose, goal_pose, at, goal)
     if homes:
-        path = homed_return_moves(profile, point.printed, way, heat)
+        path = homed_return_moves(profile, point.printed, way, heat, point.checkpoint.z_offset_mm)
     else:
         path = ["G21", "G90", *heat, *return_moves(profile, point.printed, way)]
     return (*path, *push, *point.modal.lines())
 
 
 def position_at_interruption(point: InterruptedPrint, profile: Profile) -> tuple[Floats, Pose]:
-    """Positions of the axes at the interruption. Raises JournalError when tip or table may have been moving."""
+    """Positions of the axes at the interruption, with the Z offset. Raises JournalError when tip or table may have been
+    moving."""
     state, known = point.checkpoint.state, [value for value in point.checkpoint.pose[:E_AXIS] if value is not None]
     if state in PARKED and len(known) == E_AXIS:
-        return np.array(known[:3]), Pose(*known[3:])
+        return np.array([*known[:2], known[2] + point.checkpoint.z_offset_mm]), Pose(*known[3:])
     if state in MOVING and not profile.machine.gcode.resume:
-        raise JournalError(f"the tip was on its way between print and parking place, so nobody knows where it stands; {HOME_IT}")
+        raise JournalError(f"the tip was on its way between print and parking place, so its position is unknown; {HOME_IT}")
     states = [point.modal, *point.ahead.values()]
     for axis in (3, 4):
         if len({modal.at[axis] for modal in states}) > 1 and not profile.machine.gcode.resume:
             letter = point.modal.axes.letters[axis]
             where = f"lines {point.line} to {point.last}"
-            raise JournalError(f"{where}: the table was turning about {letter}, so nobody knows where it stands; {HOME_IT}")
+            raise JournalError(f"{where}: the table was turning about {letter}, so its position is unknown; {HOME_IT}")
     at, pose = _goal(point, profile)
     return np.array([at[0], at[1], heights_mm(point)[0]]), pose
 
 
 def heights_mm(point: InterruptedPrint) -> tuple[float, ...]:
-    """Possible heights Z of the tip, rising; a single one if the user has measured it. Assumed too low, the tip prints too high;
-    assumed too high, it ploughs through the print."""
+    """Possible heights Z of the tip, with its Z offset, rising; a single one if the user has measured it. Assumed too low, the
+    tip prints too high; assumed too high, it ploughs through the print."""
     if point.stood_mm is not None:
         return (point.stood_mm,)
-    heights = sorted(z for modal in (point.modal, *point.ahead.values()) if (z := modal.at[2]) is not None)
+    modals, offset_mm = (point.modal, *point.ahead.values()), point.checkpoint.z_offset_mm
+    heights = sorted(z + offset_mm for modal in modals if (z := modal.at[2]) is not None)
     return tuple(z for k, z in enumerate(heights) if k == 0 or z - heights[k - 1] > UNSURE_MM)
 
 

@@ -217,6 +217,15 @@ def lift_tip(wire: Wire, medium: Medium, words: str, feed_mm_min: float, on_turn
     return position if arrived else None
 
 
+def reset_overrides(wire: Wire, medium: Medium, commands: Sequence[str], on_turn: Callable[[], None]) -> bool:
+    """Send the commands that take the user's overrides back; True when the printer has answered them. Raises PortError."""
+    return Orders(wire, medium, on_turn).give(
+        (*commands, "M105"),
+        lambda event: event.kind is Kind.OK and event.temperature is not None,
+        medium.now_s() + FAULT_S,
+    )
+
+
 def emergency_stop(wire: Wire, medium: Medium) -> bool:
     """Send M112 before everything that waits to be sent, and repeat it; True when the printer reports that it has halted.
 

@@ -9,13 +9,13 @@ from machine.link.exchange import Exchange
 from machine.link.feed import Feed
 from machine.link.journal import Journal
 from machine.link.medium import SERIAL, Medium, Wire, reopen
-from machine.link.pending_commands import CancelledError, Control, EmergencyError
+from machine.link.pending_commands import CancelledError, Control, EmergencyError, percents_undone
 from machine.link.port import find_again, find_device, stable_name
 from machine.link.print_state import PrintState, PrintStatus, last_known
 from machine.link.protocol.connection import Connection
 from machine.link.protocol.framing import LINE_LIMIT, command_of
 from machine.link.resume import ResumePoint
-from machine.link.shutdown import SETTLE_S, HeaterGuard, Heaters, lift_tip
+from machine.link.shutdown import SETTLE_S, HeaterGuard, Heaters, lift_tip, reset_overrides
 from machine.link.status import PrinterStatus, line_was_done, query_status
 from profiles.errors import FirmwareError, PortError, PrinterError, SilenceError, add_words
 from profiles.profile import Profile
@@ -39,7 +39,7 @@ class Outcome:
     # After a cancel: whether the printer's report proves it. None: the program ended by itself, or nothing of it was sent.
     heaters_off: bool | None = None
     halted: str = ""  # after a halt: what makes the printer print again
-    kept_offset: str = ""  # after a cancel: a Z offset that outlasts the print, in words
+    kept: str = ""  # after a cancel: the user's settings that outlast the print, in words
 
 
 def print_lines(
@@ -164,10 +164,12 @@ class _Print:
         except PrinterError as error:
             if self.feed.started:
                 add_words(error, f"{self._leave(error)}{self._hint()}")
+                self._add_kept(error)
             raise
         except BaseException as error:
             if self.feed.started:
                 add_words(error, self._shut_down(SETTLE_S).value)
+                self._add_kept(error)
             raise
         self._guard.release()
         return None
@@ -175,7 +177,7 @@ class _Print:
     def _cancel(self) -> Heaters | None:
         if not self.feed.started:
             return None
-        waits = "the printer is waited for: what it does now (homing, a dwell) must not be stopped" if self.exchange.waits else ""
+        waits = "waiting for the printer: its homing or dwell must not be interrupted" if self.exchange.waits else ""
         self.feed.set_state(PrintState.CANCELLING, waits)
         return self._shut_down(SETTLE_S)
 
@@ -202,16 +204,32 @@ class _Print:
 
     def _shut_down(self, timeout_s: float, alive: bool = True, waits: bool = True) -> Heaters:
         """Switch the heaters off and lift the tip if the printer responds and knows its position; waits: for homing to end."""
-        exchange, feed = self.exchange, self.feed
         try:
             heaters = self._guard.switch_off(timeout_s, waits)
-            move = feed.lift_move() if heaters is Heaters.OFF and alive else None
-            if move is not None:
+            if heaters is Heaters.OFF and alive:
                 with suppress(PortError):
-                    feed.record_lift(lift_tip(exchange.wire, self.medium, *move, feed.pending.heed_emergency))
+                    self._settle()
         except EmergencyError:
             raise FirmwareError(self._stop()) from None
         return heaters
+
+    def _settle(self) -> None:
+        """Lift the tip, and reset feed and flow. A resumed print still needs its Z offset. Raises PortError, EmergencyError."""
+        wire, feed = self.exchange.wire, self.feed
+        if (move := feed.lift_move()) is not None:
+            feed.record_lift(lift_tip(wire, self.medium, *move, feed.pending.heed_emergency))
+        undone = percents_undone(feed.pending.feed_percent, feed.pending.flow_percent)
+        if undone and reset_overrides(wire, self.medium, undone, feed.pending.heed_emergency):
+            feed.pending.feed_percent = feed.pending.flow_percent = 100.0
+
+    @property
+    def _kept(self) -> str:
+        """A sentence on the settings that the printer keeps; "" after a halt, which ends by a restart."""
+        return "" if self.feed.finished or self._guard.heaters is Heaters.HALTED else self.feed.pending.kept
+
+    def _add_kept(self, error: BaseException) -> None:
+        if self._kept:
+            add_words(error, self._kept)
 
     def _hint(self) -> str:
         """Advice on how to resume an interrupted print, or why that is impossible; closes the journal to be sure."""
@@ -222,7 +240,7 @@ class _Print:
             return f"; {self.journal.warning}"
         if not self.feed.history.executed:
             return ""
-        return f"; tiltprint resume {self.journal.path} goes on with it"
+        return f"; tiltprint resume {self.journal.path} continues it"
 
     def _outcome(self, start_s: float, heaters: Heaters | None) -> Outcome:
         feed = self.feed
@@ -236,5 +254,5 @@ class _Print:
             warnings=tuple(feed.reports.warnings),
             heaters_off=None if heaters is None else heaters is not Heaters.UNPROVED,
             halted=self._guard.revival if heaters is Heaters.HALTED else "",
-            kept_offset="" if feed.finished or heaters is Heaters.HALTED else feed.pending.kept_offset,
+            kept=self._kept,
         )

@@ -78,7 +78,7 @@ class PrinterReports:
                 return None
         elif event.kind is Kind.BUSY:
             # Marlin's PAUSED_FOR_USER and PAUSED_FOR_INPUT: filament runout, M0, a question on its display.
-            self.waiting = "the printer waits for a person: look at its display" if "paused for" in event.text else ""
+            self.waiting = "the printer waits for you: look at its display" if "paused for" in event.text else ""
         if event.temperature is not None:
             self._check(event.temperature, now_s)
         if event.identity:

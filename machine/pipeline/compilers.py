@@ -60,7 +60,7 @@ class Compilers:
             return
         if not self._announced:
             self._announced = True
-            say(phrase("compiling", "compiling the kernels (only the first run that needs them does)"))
+            say(phrase("compiling", "compiling the kernels, once, for the first run that needs them"))
         with nullcontext(report) if report is not None else reporting() as show:
             while not self._ready(bundles):
                 show(phrase("compiled", f"compiling the kernels: {self._kernels} done", self._kernels))

@@ -119,7 +119,7 @@ def settings_inside(file: Path, name: str, kinds: Iterable[str] = KINDS) -> tupl
     without settings, or with damaged ones.
     """
     if not is_slicer_file(file):
-        raise ProfileError(f"{file} is no .3mf that a slicer has saved with its settings inside")
+        raise ProfileError(f"{file} is not a .3mf in which a slicer has saved its settings")
     config = read_config(file)
     found = {kind: imported(config, kind, nameless=Path(name).stem) for kind in kinds}
     counts = [f"{sum(row.taken for row in profile.rows)} of {len(profile.rows)} of the {kind}" for kind, profile in found.items()]

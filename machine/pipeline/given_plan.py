@@ -91,7 +91,7 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
     file = plan or planes or _plan_of_demo(request)
     given = None if file is None else read_plan(file)
     if given is not None and given.orientation is not None and request.orient is False:
-        raise PlanError(f"{option('as-is')}: the plan {file} lays the model down by its orientation; leave one of them out")
+        raise PlanError(f"{option('as-is')}: the plan {file} gives the model's orientation: leave one of them out")
     return given
 
 

@@ -117,7 +117,8 @@ def decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
         price, records = _price(request, to_build and not laying), list[Record]()
 
         def search(mesh: Mesh) -> Decomposition:
-            return _search(request, _plan_with_marks(request, given, model, mesh), price, report, records, mesh)
+            plan = _plan_with_marks(request, given, model, mesh)
+            return _search(request, plan, price, report, records, mesh, needs_front=not to_build)
 
         if laying:
             oriented = orient_and_decompose(mesh, profile, pricing, search)
@@ -143,10 +144,17 @@ def _price(request: ModelRequest, unused: bool) -> Pricing | None:
 
 
 def _search(
-    request: ModelRequest, given: PlanFile | None, price: Pricing | None, report: Report, records: list[Record], mesh: Mesh
+    request: ModelRequest,
+    given: PlanFile | None,
+    price: Pricing | None,
+    report: Report,
+    records: list[Record],
+    mesh: Mesh,
+    *,
+    needs_front: bool,
 ) -> Decomposition:
     """The parts of a mesh in its orientation, searched or cut by a plan. records: receives the search's record."""
-    asked = SearchRequest(given or NO_PLAN, request.parts, request.ranker, price)
+    asked = SearchRequest(given or NO_PLAN, request.parts, request.ranker, price, needs_front=needs_front)
     if request.plan is not None:
         return cut_by_plan(mesh, request.name, request.profile, asked)
 
@@ -249,7 +257,7 @@ def _without_pins(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: 
         if not part.on_plate and own.process.interlock == "pins" and not piece.pins:
             room_mm = pin_width_mm(own) + 2.0 * room_around_mm(own.process)
             deep = f"{own.process.pin_depth_mm:g} mm deep into the part below"
-            yield f"no pins under part {part.index}: one wants a place {room_mm:.1f} mm wide, where the part stands and {deep}"
+            yield f"no pins under part {part.index}: a pin needs an area {room_mm:.1f} mm wide, {deep}"
 
 
 def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:
@@ -260,7 +268,7 @@ def _left_out(program: MachineProgram, profile: Profile) -> Iterator[str]:
             f"{key_name('process.raft_first_layer_expansion_mm')} makes that wider"
         )
     if profile.machine.purge_mm > 0.0 and not has_purge(program):
-        yield f"no place on the plate is clear of the print for a line of {key_name('machine.purge_mm')}: there is none"
+        yield f"{key_name('machine.purge_mm')} has no effect: no place on the plate is clear of the print for a purge line"
     dialect = dialect_of(profile.machine)
     if profile.material.pressure_advance is not None and not dialect.pressure_advance:
         yield f"{key_name('material.pressure_advance')} is left out: {dialect.firmware} has no command for it"

@@ -153,7 +153,7 @@ def _reason(misfit: Misfit, models: Sequence[Decomposition], sizes_mm: Sequence[
         wanted = f"{phrase('one part', '--parts 1 prints each in one piece')}, all layer by layer"
         if profile.process.complete_objects:
             wanted = f"{key_name('process.complete_objects')} = false prints them layer by layer"
-        return f"{what} no place beside {others} at which the head passes what stands while it prints: {wanted}"
+        return f"{what} no place beside {others} that the head reaches without hitting them: {wanted}"
     if alike:
         return f"{what} room for {misfit.standing} with {gap_mm:g} mm between them"
     if misfit.standing == 0:

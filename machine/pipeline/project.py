@@ -291,7 +291,7 @@ def read_folder(folder: Path) -> Project:
     except NewerError:
         raise PlanError(f"this work was kept by a newer tiltprint, which can open it; it stays in {folder}") from None
     except PlanError as error:
-        raise PlanError(f"what is kept in {folder} is no work of a workbench, or damaged: {error}") from None
+        raise PlanError(f"the work in {folder} is not of a workbench, or damaged: {error}") from None
     except OSError as error:
         raise PlanError(f"the work in {folder} cannot be read: {reason(error)}") from None
 
@@ -446,7 +446,7 @@ def unpack(path: Path, folder: Path) -> Project:
     except PlanError as error:
         raise PlanError(f"{path}: this project is damaged: {error}") from None
     except DAMAGED as error:
-        raise PlanError(f"{path}: this project is damaged: it is no whole zip archive ({first_line(error)})") from None
+        raise PlanError(f"{path}: this project is damaged: it is not a complete zip archive ({first_line(error)})") from None
     if changed:
         raise PlanError(
             f"{path}: another program has changed the model in this project, which its plan was made for: save the model"
@@ -470,7 +470,7 @@ def _extract(archive: zipfile.ZipFile, folder: Path) -> bool:
             continue  # zip -r writes an entry for each folder
         name = entry.filename.removeprefix(INSIDE)
         if not FILE_NAME.fullmatch(name) or (folder / name).exists():
-            raise PlanError(f"{entry.filename!r} is no name of a file of a project, or there twice")
+            raise PlanError(f"{entry.filename!r} is not the name of a project's file, or occurs twice")
         with archive.open(entry) as source, (folder / name).open("xb") as copy:
             shutil.copyfileobj(source, copy)
     digest = hashlib.sha256(archive.read(MODEL_PART)).hexdigest()

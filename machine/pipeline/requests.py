@@ -19,7 +19,7 @@ SIMULATED = "sim"  # the port of the simulated printer
 BAUD = 115200
 UPLOAD_MIB = 256  # the largest upload from a page: five million facets of a binary STL
 MOST_COPIES = 1000  # of a model, and models on a plate
-FORCE_GOES_ON = phrase("force", "--force goes on")  # ending of a forcible error's message
+FORCE_GOES_ON = phrase("force", "--force continues")  # ending of a forcible error's message
 
 
 def check_copies(count: int, said: str) -> None:
@@ -93,6 +93,11 @@ class ModelRequest:
     def name(self) -> str:
         """Name of the (first) model for files and messages: the file's name without its folder."""
         return self.model if self.model.startswith("demo:") else Path(self.model).name
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """The models of the plate, each once."""
+        return tuple(dict.fromkeys((self.model, *self.beside)))
 
     @property
     def plan(self) -> Path | None:

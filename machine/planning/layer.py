@@ -1,5 +1,5 @@
 """Layer: a layer's strokes as moves, as fast as axes, extruder and hot end allow, and the travels between them: retraction with a
-wipe, lift, and crossing at a height at which the head clears what stands beside a limb.
+wipe, lift, and crossing at a height at which the head clears the print beside a limb.
 
 Filament that replaces what oozed during a turn of the table is pushed within an inner stroke, not at standstill. How much oozed
 is unknown. At the beginning of a wall, excess filament would leave a blob on the seam; spread over the first stretch of infill or
@@ -50,7 +50,7 @@ class Tip:
     """Position of the tip (machine X Y Z), pose of the table, hull of the earlier parts, and all moves so far.
 
     trail: (n, 3) path of a wipe over the strokes since the last retraction. run_in_mm: filament that the next inner strokes are
-    to push in addition. limb: while a limb is printed, its part number and what stands beside it. has_limbs: a limb has been
+    to push in addition. limb: while a limb is printed, its part number and the print beside it. has_limbs: a limb has been
     printed, so that the print may be higher than the tip.
     """
 
@@ -97,7 +97,7 @@ class Tip:
 def height_to(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: Floats) -> float:
     """Z at which the tip crosses along an approach (k, 2) to a stroke's start, retracted if `retracts`.
 
-    Within a limb the tip retracts and lifts wherever the head would hit what stands beside the limb.
+    Within a limb the tip retracts and lifts wherever the head would hit the print beside the limb.
     """
     if retracts:
         retract(tip)
@@ -113,7 +113,7 @@ def height_to(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: 
 
 
 def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, over: float) -> float:
-    """Z at which the head clears what stands beside a limb on the way to a path's start. `over` if that suffices, else the least
+    """Z at which the head clears the print beside a limb on the way to a path's start. `over` if that suffices, else the least
     sufficient height with the clearance of the nozzle."""
     assert tip.limb is not None
     (part, standing), machine = tip.limb, tip.profile.machine
@@ -124,7 +124,7 @@ def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, ove
     z_mm += machine.clearance_mm
     if z_mm > machine.z.limits_mm[1]:
         raise MoveError(
-            f"part {part}: a way within it needs the tip at Z {z_mm:.1f} mm for the head to pass what stands beside the part, "
+            f"part {part}: a way within it needs the tip at Z {z_mm:.1f} mm for the head to pass the print beside the part, "
             f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm"
         )
     return z_mm

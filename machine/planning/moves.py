@@ -78,8 +78,8 @@ class MachineProgram:
     """All moves of a print in order, one row each, and the model's name for the file's head.
 
     points_mm: (n, 3) machine coordinates; starts: (m + 1,) first point of each move; filament_mm: (n,) pushed on the way to each
-    point, 0 at the first one of a path, where the tip already is. Wipes and retractions push less than 0. A retraction and a turn
-    of the table have one point, the tip's; other marks have none. Columns, (m,) each: what: index in KINDS of a stroke, else one
+    point, 0 at the first one of a path, where the tip already is. Wipes and retractions push less than 0. Retractions and turns
+    have one point, the position of the tip; other marks have none. Columns, (m,) each: what: index in KINDS of a stroke, else one
     of TRAVEL ... MARK; speed: mm/s, deg/s of turns; width_mm; fan: 0..1, NaN for the layer's; acceleration_mm_s2: inf if the axes
     decide. marks: values of the rows that are turns or marks, in order.
     """

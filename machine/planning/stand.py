@@ -213,9 +213,14 @@ def route(turn: Turn, part: int, printed: Printed, machine: Machine, speeds: Spe
     if best is not None:
         return best
     where = f"turning the table to {machine.tilt.letter}{turn.end.tilt_deg:.3f} {machine.turn.letter}{turn.end.turn_deg:.3f}"
+    limit_mm = machine.z.limits_mm[1]
     raise MoveError(
-        f"part {part}: {where if turn.start != turn.end else 'the way to it'} needs the tip at Z {lowest:.1f} mm, "
-        f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm, and no way aside is clear"
+        f"part {part}: {where if turn.start != turn.end else 'the way to it'} needs "
+        + (
+            f"the tip at Z {lowest:.1f} mm, {machine.name} allows at most {limit_mm:g} mm"
+            if lowest > limit_mm
+            else "a place for the head that it cannot reach without touching the print"
+        )
     )
 
 

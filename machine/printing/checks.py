@@ -118,7 +118,7 @@ def check_free(server: str, status: PrintStatus) -> None:
 def check_idle(server: str, status: PrintStatus) -> None:
     """Refuse to query a server that is printing or has no printer connected. Raises ServerError."""
     if status.state.is_printing:
-        raise ServerError(f"{server} is {status.state} {status.file or 'a file'} now: ask it when that is done")
+        raise ServerError(f"{server} is {status.state} {status.file or 'a file'} now: try again when that is done")
     if status.state is PrintState.OFFLINE:
         raise ServerError(f"{server} cannot report its settings now: {status.message or 'its printer is not connected'}")
 

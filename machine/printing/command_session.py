@@ -93,7 +93,7 @@ class CommandSession:
     def heated(self) -> str:
         """Which heaters are on, in words; "" when none is. A running command counts because it may just have switched one on."""
         if not self._idle():
-            return "heaters, for a command was under way"
+            return "heaters, because a command was running"
         self.command("M105")
         targets = (("nozzle", self.heat.nozzle_target_c), ("bed", self.heat.bed_target_c))
         return " and ".join(f"{name} set to {target_c:.0f} °C" for name, target_c in targets if target_c)

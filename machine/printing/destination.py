@@ -5,6 +5,7 @@ The port's name is parsed here, once; all other code uses the value.
 
 import re
 from dataclasses import dataclass
+from difflib import get_close_matches
 from ipaddress import IPv6Address
 from math import isfinite
 from pathlib import Path
@@ -88,7 +89,9 @@ def parse_destination(port: str, baud: int = BAUD, speed: float = 0.0) -> Destin
         return Simulated(speed)
     if not DEVICE.fullmatch(port) or not port.isprintable() or port != port.strip():
         shown = f"...@{port.rpartition('@')[2]}" if "@" in port else port  # the text before it may be a password
-        raise PrinterError(f"port {_plain(shown)!r} cannot be one: a device, {SIMULATED}, {ADDRESSES}, {SERVERS} is expected")
+        raise PrinterError(f"port {_plain(shown)!r} is not a port: a device, {SIMULATED}, {ADDRESSES}, {SERVERS} is expected")
+    if get_close_matches(port.lower(), [SIMULATED]) and not Path(port).exists():
+        raise PrinterError(f"port {_plain(port)} does not exist: did you mean {SIMULATED}, the simulated printer?")
     return SerialPort(port, baud)
 
 
@@ -117,7 +120,7 @@ def parse_server_address(text: str) -> Server:
     kind, _, address = text.partition(":")
     kind = kind.lower()
     if "@" in address:  # never repeat it: the text before it may be a password
-        raise ServerError("server address: names and passwords do not belong into it: keys have a file of their own")
+        raise ServerError("server address: it must not hold a name or password: keys have a file of their own")
     parts = ADDRESS.fullmatch(address)
     if not is_server_address(text) or parts is None:
         raise ServerError(f"server address {_plain(text)!r}: {EXPECTED}")

@@ -1,6 +1,6 @@
 """Print history: which prints have ended, how, and how long they took: a file for each print in the state folder.
 
-A print's file is locked as long as the print goes on, and has two lines: one written when it begins, one when it ends. A print
+A print's file is locked as long as the print runs, and has two lines: one written when it begins, one when it ends. A print
 without the second line was killed.
 """
 
@@ -54,9 +54,9 @@ def past_prints() -> list[dict[str, Any]]:
 
 
 def _past(file: Path) -> dict[str, Any] | None:
-    """A print as pages get it; None for one that goes on, for a declined one, and for a damaged file."""
+    """A print as pages get it; None for one that still runs, for a declined one, and for a damaged file."""
     try:
-        goes_on, record = is_being_printed(file), dict[str, Any]()
+        is_running, record = is_being_printed(file), dict[str, Any]()
         for line in file.read_text("utf-8").splitlines():
             record |= json.loads(line)
         past = {key: record[key] for key in ("name", "port", "begun")}
@@ -64,7 +64,7 @@ def _past(file: Path) -> dict[str, Any] | None:
         past["seconds"] = record["ended"] - past["begun"] if "ended" in record else None
     except (OSError, ValueError, KeyError, TypeError, OverflowError):
         return None
-    return None if goes_on or past["outcome"] in NOT_PRINTED else past | {"filament_m": record.get("filament_m")}
+    return None if is_running or past["outcome"] in NOT_PRINTED else past | {"filament_m": record.get("filament_m")}
 
 
 def _files() -> list[Path]:

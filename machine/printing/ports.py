@@ -79,7 +79,7 @@ def _words(answer: Answer) -> dict[str, str]:
     """Words for the sentences about an answer. While Marlin works it only reports that it is busy or waiting."""
     words = answer.words[:60]
     usual = answer.words.startswith(("processing", "paused for", "busy")) or not words
-    work = "it heats, moves or waits for a person" if usual else words
+    work = "it heats, moves or waits for its user" if usual else words
     stranger = "it sends back what it receives" if answer.words in ECHO else f"it says {words!r}"
     return {"words": words, "work": work, "stranger": stranger, "firmware": answer.firmware, "revival": answer.revival}
 
@@ -103,14 +103,14 @@ NO_PRINTERS: Mapping[Kind, tuple[type[PrinterError], str, str]] = {
     ),
     Kind.STRANGER: (
         PrinterError,
-        "what answers at {port} is no printer: {stranger} instead of answering M115",
-        "something answers but is no printer: {stranger}",
+        "the device at {port} is not a printer: {stranger} instead of answering M115",
+        "a device answers but is not a printer: {stranger}",
     ),
-    Kind.RUBBISH: (
+    Kind.GARBLED: (
         PortError,
-        "only rubbish comes from {port} at {baud} baud, and no printer answers at the usual other rates: "
-        f"the firmware's settings tell {phrase('its baud rate', 'its rate for --baud')}",
-        f"rubbish at {{baud}} baud, and nothing at the usual other rates: "
+        "only garbled bytes come from {port} at {baud} baud, and no printer answers at the usual other rates: "
+        f"the firmware's settings name {phrase('its baud rate', 'its rate for --baud')}",
+        f"garbled bytes at {{baud}} baud, and nothing at the usual other rates: "
         f"{phrase('another baud rate', '--baud N tries another')}",
     ),
     Kind.SILENT: (

@@ -71,8 +71,8 @@ def _rescue_server(at: Server, emergency: bool) -> str:
     except UserError as error:
         if emergency:
             return UNCONFIRMED.format(server=at.name, error=error)
-        return f"{error}; what {at.name} prints goes on without this program: look at the printer"
+        return f"{error}; what {at.name} prints continues without this program: look at the printer"
     if status.state.is_printing:
         now = f"{at.name} is {status.state} {status.file or 'a file'}"
-        return f"{now} and goes on without this program: its own page commands it"
+        return f"{now} and continues without this program: control it on the server's page"
     return f"{at.name} prints nothing now ({status.message or status.state})"

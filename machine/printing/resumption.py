@@ -53,8 +53,8 @@ HEIGHT_QUESTION = (  # otherwise the rest would be printed too high or too low
     "the tip was cut off between two heights: it stands at {heights}; look at the print below it, for Z is not homed"
 )
 RESTARTED = (
-    "this computer may have restarted since the print began, so the newest records may be missing: see that the print is no "
-    "higher than this, and that tip and table stand as told here, before you go on"
+    "this computer may have restarted since the print began, so the newest records may be missing: check that the print is no "
+    "higher than this, and that tip and table stand as stated, before you continue"
 )
 
 
@@ -83,10 +83,11 @@ class Resumption:
         where += [f"layer {position.layer}"] if position.layer is not None else []
         letters = self.point.modal.axes.letters
         known = [f"{letter} {value:.3f}" for letter, value in zip(letters[:5], at[:5], strict=True) if value is not None]
-        torn = self.story.torn
+        torn, offset_mm = self.story.torn, self.story.last.z_offset_mm
         return (
             f"{self.name}, {', '.join([*where, f'line {self.point.line} of {len(self.lines)}'])}",
             f"surely executed: up to line {self.point.line - 1}" + (f", at {', '.join(known)}" if known else ""),
+            *([f"the tip was shifted by a Z offset of {offset_mm:+g} mm"] if offset_mm else []),
             *([f"{torn} of the journal's records could not be read: a power cut has torn them"] if torn else []),
             *([] if self.story.computer_ran_on else [RESTARTED]),
         )
@@ -213,9 +214,7 @@ def _profile(journal: Path, heading: JournalHeading, named: Profile | None) -> P
 def _program(journal: Path, story: JournalContents) -> GcodeFile:
     """The program, as it was printed. Raises JournalError."""
     if story.last.continued_in is not None:
-        raise JournalError(
-            f"journal {journal}: this print was resumed already, what became of it is in {story.last.continued_in}"
-        )
+        raise JournalError(f"journal {journal}: this print was resumed already, its rest is in {story.last.continued_in}")
     if story.finished:
         raise JournalError(f"journal {journal}: this print ran to its end, there is nothing to resume")
     program = GcodeFile(Path(story.heading.program))
@@ -228,7 +227,7 @@ def _program(journal: Path, story: JournalContents) -> GcodeFile:
 
 def _question(way: ResumePoint, point: InterruptedPrint, profile: Profile) -> str:
     """The question with the next steps, and what the user must make sure of."""
-    reason = f"it goes on with line {way.line}: {way.reason}"
+    reason = f"it continues with line {way.line}: {way.reason}"
     if not way.homes:
         return reason
     (x, y, z), pose = position_at_interruption(point, profile)

@@ -9,7 +9,7 @@ from machine.dryrun.dryrun import Timeline
 from machine.link.identification import Answer, Kind
 from machine.link.journal import Journal
 from machine.link.port import open_port
-from machine.link.print_state import PrintStatus
+from machine.link.print_state import PrintState, PrintStatus
 from machine.link.resume import ResumePoint
 from machine.link.shutdown import Heaters
 from machine.link.status import PrinterStatus
@@ -74,7 +74,7 @@ class SerialPrinter:
         except OutputError as error:
             if file is not None:
                 raise
-            say(f"this print cannot be resumed when it is cut off: {error}")
+            say(f"this print cannot be resumed if it is interrupted: {error}")
             return nullcontext()
 
     def fits(self, machine: Machine) -> str:
@@ -140,7 +140,8 @@ def stream_program(
 
         def on_progress(status: PrintStatus) -> None:
             if begun:
-                left_s = time_left_s(timeline.remaining_s, first, status, pace)
+                ends = status.state is PrintState.CANCELLING
+                left_s = None if ends else time_left_s(timeline.remaining_s, first, status, pace)
                 tell(replace(status, left_s=left_s, layers=timeline.layers(status.part), at=timeline.at(status.file_line)))
 
         return print_lines(
@@ -206,10 +207,10 @@ def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal 
     if outcome.cancelled:
         heaters = f"{Heaters.HALTED.value}: {outcome.halted}" if outcome.halted else HEATERS[outcome.heaters_off]
         say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {heaters}")
-        if outcome.kept_offset:
-            say(outcome.kept_offset)
+        if outcome.kept:
+            say(outcome.kept)
         if journal is not None and journal.last.executed and not journal.trouble:
-            say(f"tiltprint resume {journal.path} goes on with it")
+            say(f"tiltprint resume {journal.path} continues it")
         return CANCELLED
     summary = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
     show(f"{summary} ({Answer(Kind.PRINTER, outcome.firmware).firmware[:60]})\n")

@@ -23,7 +23,7 @@ from profiles.errors import FirmwareError, NoAnswerError, ServerError
 from profiles.machine import Machine
 
 LIMITS = (
-    "the server prints its own copy: this computer may go, but there is no journal to resume from after a power cut, "
+    "the server prints its own copy: this computer may be off, but there is no journal to resume from after a power cut, "
     "and pausing and cancelling do what the server's own macros say"
 )
 
@@ -107,29 +107,32 @@ class ServerPrinter:
         babystep = server.babystep or ("" if profile is None else dialect_of(profile.machine).babystep)
         with person.show(scene) as tell:
             tell(None)
+            follower = Follower(
+                server,
+                file,
+                progress.size,
+                on_status=lambda status, message: tell(progress.at(status, message)),
+                control=person.commands,
+                left=person.left,
+                running=running,
+                babystep=babystep,
+            )
             try:
-                state = Follower(
-                    server,
-                    file,
-                    progress.size,
-                    on_status=lambda status, message: tell(progress.at(status, message)),
-                    control=person.commands,
-                    left=person.left,
-                    running=running,
-                    babystep=babystep,
-                ).run()
+                state = follower.run()
             except KeyboardInterrupt:
                 say("ended at once: whether the print has been cancelled is not known, look at the printer")
                 raise
         file = file or name
         if state is PrintState.FAILED:
             raise FirmwareError(f"{STOPPED.format(server=server.name)}{progress.last_known}")
+        if follower.kept:
+            say(follower.kept)
         if state is PrintState.DONE:
             show(f"printed {file} on {server.name} in {duration(progress.elapsed_s)}\n")
             return DONE
         if state is PrintState.LEFT:
-            say(f"tiltprint: interrupted; {file} goes on printing on {server.name}")
-            return End(state, f"{name} goes on printing on {server.name}: this page follows it no more")
+            say(f"tiltprint: interrupted; {file} keeps printing on {server.name}")
+            return End(state, f"{name} keeps printing on {server.name}: this page no longer follows it")
         after = f" after {progress.line} lines" if progress.line else ""
         say(f"tiltprint: interrupted; the print was cancelled on {server.name}{after}")
         return CANCELLED
@@ -208,13 +211,14 @@ class ReportedProgress:
         if self._upload is None or timeline is None:
             return status
         self._read_to(self._upload.line_at(status.bytes_read or 0))
+        remaining_s = timeline.remaining_s(self.line)
         return replace(
             status,
             sent=self.line,
             acknowledged=self.line,
             total=len(self._lines),
             file_line=self.line,
-            left_s=timeline.remaining_s(self.line) * 100.0 / status.feed_percent,
+            left_s=None if status.state is PrintState.CANCELLING else remaining_s * 100.0 / status.feed_percent,
             share=position.share(self.line, len(self._lines)),
             part=position.part,
             parts=position.parts,

@@ -58,8 +58,8 @@ def _conversation(wire: Port, baud: int) -> str:
         firmware = identify(answer.words)
         name = firmware.name if firmware is not None else ""
     if name not in QUESTIONS:
-        words, known = answer.firmware or "of no firmware that it names", ", ".join(QUESTIONS)
-        unknown = f"the printer at {wire.name} is {words}, whose settings cannot be asked for over a port: those of {known} can"
+        words, known = answer.firmware or "of an unnamed firmware", ", ".join(QUESTIONS)
+        unknown = f"the printer at {wire.name} is {words}, whose settings cannot be queried at a port: those of {known} can"
         raise PrinterError(OTHERWISE.get(name, unknown))
     _hear_out(wire)
     return "\n".join(line for question in QUESTIONS[name] for line in _pages(wire, question))
@@ -94,7 +94,7 @@ def _ask(wire: Port, question: str) -> Iterator[str]:
             if OK.fullmatch(text):
                 return
             if AT_WORK.fullmatch(text) or GRBL_SAYS.fullmatch(text):
-                raise PrinterError(f"the printer at {wire.name} is at work ({text[:80]}): ask it when that is done")
+                raise PrinterError(f"the printer at {wire.name} is at work ({text[:80]}): try again when that is done")
             if text:
                 yield text
     raise SilenceError(f"the printer at {wire.name} does not answer {question} within {ANSWER_S:g} s: try it again")

@@ -1,4 +1,10 @@
-"""Fault scripts: reproducible faults of a serial line and a printer, at given places or by chance with a seed."""
+"""Fault scripts: reproducible faults of a serial line and a printer, at given places or by chance with a seed.
+
+At a `byte`: `drop`, `flip` (of a `bit`), `duplicate`, `delay` (by `seconds`, with all later bytes); `to = "host"` for answers. At
+an `answer`: `swallow ok`, `truncate ok`, `double ok`, of the next ok. At a `line`, `byte` or `answer`: `spurious resend` (of line
+`number`), `error` (`text`), `garbage` (stray bytes, `text`), `reset`, `silent reset` (without a greeting), `disconnect`, `stall`
+(no answers), `block` (nothing is read), each for `seconds`, `heater failure`, `thermal runaway`.
+"""
 
 import random
 from collections.abc import Callable, Iterator, Mapping

@@ -1,4 +1,13 @@
-"""Contents of the page of a print, or of parts alone, as one packed block."""
+"""Contents of the page of a print, or of parts alone, as one packed block.
+
+Keys of the header besides `arrays`: format (1); title, summary, made_by; source (`model`, `tiltprint` for our G-code, `foreign`);
+live (`state` can be requested); time_s, filament_mm, filament; lines of the file, 0 for parts alone; types, names of `;TYPE:`;
+layers_by (`comments` or `heights`); thinned, {rows, kept} of a simplified print; text, {patterns, zeros}; parts: number, rows,
+pose, base plane, volume, risky areas, joint, ranges in `vertices` and `faces` (index 0 without `;PART:`); machine: the kinematic
+keys of the profile with unit axes, known false for a guess; front: the rows of `decompose --json` with the bases of parts 2, 3,
+... (a point belongs to the last part whose plane it is above, else to part 1); findings, row -1 for the whole print; report:
+facts and tables, all texts. null: unknown.
+"""
 
 from collections.abc import Sequence
 from importlib.metadata import version
@@ -40,13 +49,7 @@ def of_parts(decomposition: Decomposition, profile: Profile, alternatives: Seque
 
 
 def of_print(
-    name: str,
-    program: Program,
-    profile: Profile,
-    *,
-    known: bool = True,
-    alternatives: Sequence[Alternative] = (),
-    live: bool = False,
+    name: str, program: Program, profile: Profile, known: bool, alternatives: Sequence[Alternative], live: bool
 ) -> bytes:
     """Pack the page of a whole print. known: the print was made for this machine; live: the page follows a running print."""
     run, by_layer = program.run, paths.layers_of(program.run.program, profile.process.layer_height_mm)
@@ -72,14 +75,7 @@ def of_print(
         "front": [] if decomposition is None else front_records(decomposition),
         "findings": scene.finding_records(run, profile.machine, known, shown),
         "report": print_report(
-            program,
-            profile,
-            by_layer,
-            parts,
-            joints=joints,
-            alternatives=alternatives,
-            known=known,
-            ours=source != "foreign",
+            program, profile, by_layer, parts, joints=joints, alternatives=alternatives, known=known, ours=source != "foreign"
         ),
     }
     header["summary"] = _summary(header, len(by_layer.first) if len(shown) else None)
@@ -88,7 +84,6 @@ def of_print(
 
 
 def compared(header: dict[str, Any], alternatives: Sequence[Alternative]) -> dict[str, Any]:
-    """Add alternatives to the header of a print."""
     return header | {"report": with_alternatives(header["report"], alternatives)}
 
 
@@ -121,12 +116,12 @@ def _head(name: str, source: str, profile: Profile, known: bool) -> dict[str, An
 def _summary(header: dict[str, Any], layers: int | None) -> str:
     """The page in a line: parts, layers (None: no paths), time and filament, and how much of a simplified print there is."""
     parts, thinned = header["parts"], header["thinned"]
-    told = [_many(len(parts), "part")] if any(part["index"] for part in parts) else []
+    phrases = [_many(len(parts), "part")] if any(part["index"] for part in parts) else []
     if layers is not None:
-        told += [_many(layers, "layer"), duration(header["time_s"]), f"{header['filament_mm'] / 1000.0:.2f} m of filament"]
+        phrases += [_many(layers, "layer"), duration(header["time_s"]), f"{header['filament_mm'] / 1000.0:.2f} m of filament"]
     if thinned:
-        told.append(f"thinned: {thinned['kept']:,} of {_many(thinned['rows'], 'move')}")
-    return " · ".join(told)
+        phrases.append(f"thinned: {thinned['kept']:,} of {_many(thinned['rows'], 'move')}")
+    return " · ".join(phrases)
 
 
 def _many(count: int, thing: str) -> str:

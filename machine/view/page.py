@@ -39,7 +39,7 @@ def print_page(
     live: bool = False,
 ) -> bytes:
     """The page of a whole print; arguments as for of_print."""
-    return page(name, of_print(name, program, profile, known=known, alternatives=alternatives, live=live), live)
+    return page(name, of_print(name, program, profile, known, alternatives, live), live)
 
 
 def with_comparison(content: bytes, alternatives: Sequence[Alternative]) -> bytes:
@@ -52,7 +52,8 @@ def with_comparison(content: bytes, alternatives: Sequence[Alternative]) -> byte
 
 def page(title: str, block: bytes, live: bool = False) -> bytes:
     """The HTML file. title: any text; block: from machine.view.contents; live: the page may fetch the state from its server."""
-    style, script, body = _template()
+    style, body = ((TEMPLATE / name).read_text("utf-8") for name in ("style.css", "page.html"))
+    script = bundle(TEMPLATE / "main.js")
     put = {
         "<!--TITLE-->": escape(title),
         "<!--CSP-->": f'<meta http-equiv="Content-Security-Policy" content="{policy(style, script, live)}">',
@@ -68,11 +69,6 @@ def policy(style: str, script: str, live: bool) -> str:
     asks = "; connect-src 'self'" if live else ""
     pictures = "img-src data: blob:; base-uri 'none'; form-action 'none'"
     return f"default-src 'none'; script-src {hash_source(script)}; style-src {hash_source(style)}; {pictures}{asks}"
-
-
-def _template() -> tuple[str, str, str]:
-    """Style, bundled scripts, and the page around them."""
-    return (TEMPLATE / "style.css").read_text("utf-8"), bundle(TEMPLATE / "main.js"), (TEMPLATE / "page.html").read_text("utf-8")
 
 
 def bundle(entry: Path) -> str:

@@ -53,9 +53,9 @@ def risky_before_mm2(part: Part, angle_deg: float, count_platform_faces: bool) -
 
 
 def front_record(row: FrontRow) -> dict[str, Any]:
-    """A row of a front for pages. planes: in print order, beginning with part 2; why: reason of the chosen row, else ""."""
+    """A row of a front for pages. planes: in print order, beginning with part 2; why: reason of the chosen row, or flaw."""
     planes = [plane_values(plane) for plane in reversed(row.planes)]
-    return front_values(row) | {"why": row.reason, "planes": planes, "figures": front_figures(row)}
+    return front_values(row) | {"why": row.reason or row.flaw, "planes": planes, "figures": front_figures(row)}
 
 
 def front_figures(row: FrontRow) -> list[tuple[str, str, str]]:

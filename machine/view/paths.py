@@ -1,4 +1,13 @@
-"""Paths: the rows of a dry run as columns of the page, one row per straight move, thinned for very long programs; and layers."""
+"""Paths: the rows of a dry run as columns of the page, one row per straight move, thinned for very long programs; and layers.
+
+Arrays, n rows: end (n, 5), X Y Z (mm), tilt, turn (deg) at the end of the move, machine frame; jump_row (j,), jump_start (j, 5):
+rows that begin elsewhere than the previous one ends, and where; time (s, waits included) and filament (mm) up to the end of the
+move; line of the file, part, layer, from 1, 0: unknown; speed, as commanded, mm/s, deg/s for pure turns; kind: 0 travel, 1
+extrude, 2 retract, 3 rotate, 4 wipe, 5 prime; type: index into the header's types; width, height of the bead, mm; fan, 0 to 1;
+nozzle, bed: target temperatures, deg C. layer_...: a layer's part, number in it, first row, count of rows, height above the
+part's base (mm), duration (s). machine.view.scene adds vertices (mm, workpiece frame), faces, and face_marks: bit 0, needs
+support in its part; bit 1, in one piece. machine.view.text adds text.
+"""
 
 from dataclasses import dataclass
 from typing import Any

@@ -20,7 +20,7 @@ from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition, Part
 from mdp.directions.orientation import best_orientation, in_words, set_on_plate
 from mdp.joint import Joint, weakest_of
-from profiles.errors import ProfileError
+from profiles.errors import ProfileError, counted
 from profiles.frozen import Frozen
 from profiles.messages import terminal_words
 from profiles.places import OF_KIND, shipped
@@ -49,7 +49,11 @@ def parts_report(
     decomposition: Decomposition, profile: Profile, joints: Sequence[Joint], alternatives: Sequence[Alternative] = ()
 ) -> dict[str, Any]:
     """The report of a page of parts alone; alternatives: their costs, if known."""
-    facts = [["parts", str(len(decomposition.parts))], ["volume", _cm3(decomposition.volume_mm3)], *_names(profile)]
+    facts = [
+        ["parts", str(len(decomposition.parts))],
+        ["volume", f"{decomposition.volume_mm3 / 1000.0:.2f} cm³"],
+        *_names(profile),
+    ]
     rows = [_solid(part, profile) for part in decomposition.parts]
     parts = _table("Parts", SOLID, rows, [RISKY])
     tables = [
@@ -160,6 +164,7 @@ def _front(decomposition: Decomposition) -> list[Table]:
         areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", f"{row.cost_mm2:.1f}"]
         rows.append([f"{row.parts}{' (chosen)' * row.chosen}", *areas, time, filament])
     notes = [f"chosen: {row.reason}" for row in front if row.chosen]
+    notes += [f"{counted(row.parts, 'part')} only on request: {row.flaw}" for row in front if row.flaw and not row.chosen]
     notes.append("--parts selects another row; time and filament are estimates")
     return [
         _table(
@@ -258,10 +263,6 @@ def _format_fixed(value: float, digits: int) -> str:
 
 def _share(part: float, whole: float) -> str:
     return f"{_format_fixed(100.0 * part / whole if whole > 0 else 0.0, 1)} %"
-
-
-def _cm3(volume_mm3: float) -> str:
-    return f"{volume_mm3 / 1000.0:.2f} cm³"
 
 
 def settings_tables(profile: Profile) -> list[Table]:

@@ -3,6 +3,12 @@
 The rows contain everything but the form of a move's line: `G1 X12.500 Y3.250 E0.04214` is the pattern `G1 X. Y. E.` with holes
 for numbers. Some thousand patterns and a pattern index per line reproduce the text exactly, in a hundredth of its compressed
 size.
+
+A hole is a character U+0001 to U+0006 in place of the number behind a capital letter. For X, Y and Z the number is `end` of the
+line's last row, three decimals. For other letters it is filament, five decimals: with U+0001 to U+0003 the filament of this
+line's rows, with U+0004 to U+0006 the sum at its end less the current zero. `zeros` holds pairs of a line and a zero from there,
+in 0.00001 mm; before the first the zero is 0. U+0001 and U+0004 stand for all decimals, U+0002 and U+0005 for no trailing zeros
+(nor point), U+0003 and U+0006 also for no zero before the point.
 """
 
 from collections.abc import Mapping, Sequence

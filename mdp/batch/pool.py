@@ -169,13 +169,13 @@ def _on_cluster(workers: Workers, address: str) -> Iterator[Pool]:
     try:
         client = Client(address, timeout=REACHED_WITHIN_S)
     except (OSError, TimeoutError, ValueError) as error:
-        raise UserError(f"scheduler {address}: cannot be reached ({error})") from None
+        raise UserError(f"scheduler {address} cannot be reached ({error})") from None
 
     def submit(task: Callable[..., Any], arguments: tuple[Any, ...], number: int) -> Any:
         call = (task, arguments, workers.retries, workers.limit_s)
         return client.submit(call_on_worker, *call, pure=False, priority=-number)
 
-    lost = f"scheduler {address}: is gone; started again, the work goes on where it stopped"
+    lost = f"scheduler {address} is gone; started again, the work continues where it stopped"
     try:
         for worker, missing in client.run(folders_missing, workers.folders, on_error="return").items():
             if missing:

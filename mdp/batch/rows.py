@@ -30,7 +30,7 @@ def writing_alone(folder: Path, lock: str) -> Iterator[None]:
                 raise UserError(f"folder {folder}: another run writes into it; wait for it or take another")
             yield
     except OSError as error:
-        raise UserError(f"folder {folder}: cannot be written ({error})") from None
+        raise UserError(f"folder {folder} cannot be written ({error})") from None
 
 
 def read_rows(path: Path, kind: type[Row]) -> list[Row]:

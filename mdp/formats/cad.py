@@ -33,9 +33,9 @@ def read(path: Path) -> list[Surface]:
     _check_numbers(path, content)
     scene = to_glb(path, content, kind)
     if not scene:
-        raise MeshError(f"{path}: is not a valid {kind.upper()} file")
+        raise MeshError(f"{path} is not a valid {kind.upper()} file")
     if kind == "iges" and not LAST_LINE.search(content[-1000:]):
-        raise MeshError(f"{path}: is cut short: its last section (T, terminate) is missing")
+        raise MeshError(f"{path} is cut short: its last section (T, terminate) is missing")
     gap = 2.0 * DEFLECTION_MM if kind == "iges" else 0.0
     surfaces = [replace(surface, vertices=MM[kind] * surface.vertices, gap=gap) for surface in glb.read_scene(path, scene)]
     notes = (*_assembly(surfaces), *_lost(glb.parts_without_faces(scene)), *surfaces[0].notes)
@@ -46,7 +46,7 @@ def _check_numbers(path: Path, content: bytes) -> None:
     """Raises MeshError for a number beyond the range of a float: the library drops its entity, or never ends."""
     for number in LARGE.findall(content):
         if math.isinf(float(number.replace(b"D", b"E"))):
-            raise MeshError(f"{path}: is damaged: it holds the number {number.decode()[:40]}, which is not finite")
+            raise MeshError(f"{path} is damaged: it holds the number {number.decode()[:40]}, which is not finite")
 
 
 def _assembly(surfaces: list[Surface]) -> tuple[str, ...]:

@@ -44,7 +44,7 @@ def read_scene(path: Path, content: bytes) -> list[Surface]:
         check_extensions(path, document)
         surfaces, bare = _scene_meshes(path, document, binary)
     except (LookupError, TypeError, ValueError, AttributeError, OverflowError):
-        raise MeshError(f"{path}: is damaged: its glTF document holds something of a kind that does not belong there") from None
+        raise MeshError(f"{path} is damaged: its glTF document holds something of a kind that does not belong there") from None
     if not surfaces:
         raise MeshError(f"{path}: its scene places no mesh" + (" but points and lines" if bare else ""))
     if bare:
@@ -56,9 +56,9 @@ def read_scene(path: Path, content: bytes) -> list[Surface]:
 def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
     magic, version, length = struct.unpack("<III", content[:12]) if len(content) >= 20 else (0, 0, 0)
     if magic != MAGIC or version != 2:
-        raise MeshError(f"{path}: is not a GLB file of version 2")
+        raise MeshError(f"{path} is not a GLB file of version 2")
     if len(content) < length:
-        raise MeshError(f"{path}: is cut short: it holds {len(content)} of the {length} bytes that its header announces")
+        raise MeshError(f"{path} is cut short: it holds {len(content)} of the {length} bytes that its header announces")
     chunks: dict[int, bytes] = {}
     offset = 12
     while offset + 8 <= length:
@@ -68,11 +68,11 @@ def _chunks(path: Path, content: bytes) -> tuple[Any, bytes]:
     try:
         return json.loads(chunks.get(JSON_CHUNK, b"")), chunks.get(BINARY_CHUNK, b"")
     except RecursionError:
-        raise MeshError(f"{path}: is damaged: its glTF document is nested too deep") from None
+        raise MeshError(f"{path} is damaged: its glTF document is nested too deep") from None
     except json.JSONDecodeError as error:
-        raise MeshError(f"{path}: is damaged: its glTF document is not valid JSON at character {error.pos + 1}") from None
+        raise MeshError(f"{path} is damaged: its glTF document is not valid JSON at character {error.pos + 1}") from None
     except ValueError:  # invalid UTF-8, or a number of thousands of digits
-        raise MeshError(f"{path}: is damaged: its glTF document holds text or a number that cannot be read") from None
+        raise MeshError(f"{path} is damaged: its glTF document holds text or a number that cannot be read") from None
 
 
 def check_extensions(path: Path, document: Any) -> None:
@@ -86,9 +86,9 @@ def _entry(path: Path, document: Any, kind: str, number: Any) -> Any:
     """An entry of one of the document's lists, such as "accessors". Raises MeshError if the list has no such entry."""
     entries = document.get(kind, [])
     if not isinstance(entries, list):
-        raise MeshError(f"{path}: is damaged: {kind} of its glTF document is not a list")
+        raise MeshError(f"{path} is damaged: {kind} of its glTF document is not a list")
     if not isinstance(number, int) or not 0 <= number < len(entries):
-        raise MeshError(f"{path}: is damaged: it names {number!r:.40} of its {kind}, there are {len(entries)} (counted from 0)")
+        raise MeshError(f"{path} is damaged: it names {number!r:.40} of its {kind}, there are {len(entries)} (counted from 0)")
     return entries[number]
 
 
@@ -160,7 +160,7 @@ def _matrix(path: Path, node: Any) -> Floats:
     """(4, 4) acting on column vectors: the node's matrix, or translation @ rotation (quaternion x y z w) @ scale."""
     for key, size in (("matrix", 16), ("rotation", 4), ("scale", 3), ("translation", 3)):
         if key in node and not _is_numbers(node[key], size):
-            raise MeshError(f"{path}: is damaged: {key} of a node is {str(node[key])[:60]}, it must be {size} finite numbers")
+            raise MeshError(f"{path} is damaged: {key} of a node is {str(node[key])[:60]}, it must be {size} finite numbers")
     if "matrix" in node:
         return np.array(node["matrix"], dtype=np.float64).reshape(4, 4).T
     x, y, z, w = node.get("rotation", (0.0, 0.0, 0.0, 1.0))
@@ -185,14 +185,14 @@ def _is_number(value: Any) -> bool:
 
 def _primitive_surface(path: Path, document: Any, binary: bytes, primitive: Any, matrix: Floats) -> Surface:
     if primitive.get("mode", TRIANGLES) != TRIANGLES or primitive.get("extensions", {}).keys() & {"KHR_draco_mesh_compression"}:
-        raise MeshError(f"{path}: holds strips or fans of triangles or compressed geometry; only plain triangles are read")
+        raise MeshError(f"{path} holds strips or fans of triangles or compressed geometry; only plain triangles are read")
     vertices = _accessor_rows(path, document, binary, _positions(path, primitive), 3)
     if "indices" in primitive:
         corners = _accessor_rows(path, document, binary, primitive["indices"], 1).astype(np.int64)
     else:
         corners = np.arange(len(vertices))
     if corners.size % 3:
-        raise MeshError(f"{path}: is damaged: a mesh has {corners.size} corners of triangles, they must be a multiple of 3")
+        raise MeshError(f"{path} is damaged: a mesh has {corners.size} corners of triangles, they must be a multiple of 3")
     faces = corners.reshape(-1, 3)
     vertices = check_surface(path, vertices, faces).vertices
     if not np.array_equal(matrix, np.eye(4)):
@@ -205,7 +205,7 @@ def _primitive_surface(path: Path, document: Any, binary: bytes, primitive: Any,
 def _positions(path: Path, primitive: Any) -> Any:
     """The accessor number of a primitive's vertices."""
     if "POSITION" not in primitive.get("attributes", {}):
-        raise MeshError(f"{path}: is damaged: a mesh has no vertices (POSITION)")
+        raise MeshError(f"{path} is damaged: a mesh has no vertices (POSITION)")
     return primitive["attributes"]["POSITION"]
 
 
@@ -235,26 +235,26 @@ def _accessor_rows(path: Path, document: Any, binary: bytes, number: int, width:
     """(n, width) values of an accessor, strides honoured."""
     accessor = _entry(path, document, "accessors", number)
     if "bufferView" not in accessor and "sparse" not in accessor:
-        raise MeshError(f"{path}: is damaged: accessor {number} names no bufferView")
+        raise MeshError(f"{path} is damaged: accessor {number} names no bufferView")
     view = _entry(path, document, "bufferViews", accessor["bufferView"]) if "bufferView" in accessor else {}
     if "sparse" in accessor or view.get("extensions") or _entry(path, document, "buffers", view.get("buffer")).get("uri"):
         raise MeshError(
-            f"{path}: holds sparse or compressed data or data in another file; only plain data inside the file is read"
+            f"{path} holds sparse or compressed data or data in another file; only plain data inside the file is read"
         )
     component = accessor.get("componentType")
     if component not in COMPONENTS:
         known = ", ".join(map(str, COMPONENTS))
-        raise MeshError(f"{path}: is damaged: componentType of accessor {number} is {component!r:.40}, it must be one of {known}")
+        raise MeshError(f"{path} is damaged: componentType of accessor {number} is {component!r:.40}, it must be one of {known}")
     if accessor.get("type", TYPES[width]) != TYPES[width]:
         raise MeshError(
-            f"{path}: is damaged: type of accessor {number} is {accessor['type']!r:.40}, it must be {TYPES[width]} here"
+            f"{path} is damaged: type of accessor {number} is {accessor['type']!r:.40}, it must be {TYPES[width]} here"
         )
     kind = np.dtype(COMPONENTS[component])
     count, stride = int(accessor["count"]), int(view.get("byteStride", 0)) or kind.itemsize * width
     start = int(view.get("byteOffset", 0)) + int(accessor.get("byteOffset", 0))
     end = start + stride * (count - 1) + kind.itemsize * width
     if count < 1 or start < 0 or stride < 1 or end > len(binary):
-        raise MeshError(f"{path}: is damaged: an accessor of {count} rows lies outside the file's {len(binary)} bytes of data")
+        raise MeshError(f"{path} is damaged: an accessor of {count} rows lies outside the file's {len(binary)} bytes of data")
     rows = np.ndarray((count, width), kind, binary, start, (stride, kind.itemsize))
     if not accessor.get("normalized") or kind.kind == "f":
         return rows

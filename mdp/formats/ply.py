@@ -47,13 +47,13 @@ def read(path: Path) -> list[Surface]:
             else:
                 columns[name], position = _ascii_rows(words, position, count, properties)
         except (ValueError, IndexError, OverflowError):
-            raise MeshError(f"{path}: is cut short or malformed in its {count} rows of `{name}`") from None
+            raise MeshError(f"{path} is cut short or malformed in its {count} rows of `{name}`") from None
     every = [(table, column) for table, _, properties in elements for column in properties]
     kinds = {(table, name): kind for table, (name, kind, length) in every if not length}
     listed = {(table, name) for table, (name, _, length) in every if length}
     corners = next((name for name in ("vertex_indices", "vertex_index") if ("face", name) in listed), None)
     if corners is None or not {("vertex", axis) for axis in "xyz"} <= kinds.keys():
-        raise MeshError(f"{path}: needs the elements `vertex` with x, y, z and `face` with a list vertex_indices")
+        raise MeshError(f"{path} needs the elements `vertex` with x, y, z and `face` with a list vertex_indices")
     vertex, polygons = columns["vertex"], columns["face"][corners]
     vertices = np.stack([np.asarray(vertex[axis], dtype=np.float64) for axis in "xyz"], axis=1)
     painted = _colours(columns["face"], kinds, "face")
@@ -97,7 +97,7 @@ def _header(path: Path, content: bytes) -> tuple[str, list[Element], int]:
     body = content.find(b"\n", end) + 1
     lines = [line.decode("latin-1").split() for line in content[: max(end, 0)].splitlines()]
     if end < 0 or not body or lines[0] != ["ply"]:
-        raise MeshError(f"{path}: is not a PLY file: no header from `ply` to `end_header`")
+        raise MeshError(f"{path} is not a PLY file: no header from `ply` to `end_header`")
     order, elements = None, list[Element]()
     try:
         for words in lines[1:]:

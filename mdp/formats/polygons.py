@@ -65,7 +65,7 @@ def _read_off(path: Path) -> Surface:
     stripped = ((number, line.split("#", 1)[0].split()) for number, line in enumerate(text_lines(path), 1))
     lines = [(number, words) for number, words in stripped if words]
     if not lines or lines[0][1][0] not in OFF_KINDS:
-        raise MeshError(f"{path}: is not an OFF file: its first word is none of {', '.join(OFF_KINDS)}")
+        raise MeshError(f"{path} is not an OFF file: its first word is none of {', '.join(OFF_KINDS)}")
     counts_line, first = (lines[0][1][1:], 1) if len(lines[0][1]) > 1 else (lines[1][1] if len(lines) > 1 else [], 2)
     counts = parse_integers(path, [counts_line[:2]], "the line of counts").tolist()
     if len(counts) < 2 or min(counts) < 0:

@@ -27,7 +27,7 @@ def _read(module: str, path: Path, plate: int | None) -> "Build":
 
         return read_build(path, plate)
     if plate is not None:
-        raise MeshError(f"{path}: has no plates: {option('plate', plate)} goes with a file of Bambu Studio or OrcaSlicer (.3mf)")
+        raise MeshError(f"{path} has no plates: {option('plate', plate)} goes with a file of Bambu Studio or OrcaSlicer (.3mf)")
     from mdp.formats.slicer_file import Build, BuildObject, Role
 
     return Build([BuildObject([(surface, Role()) for surface in import_module(f"mdp.formats.{module}").read(path)])])

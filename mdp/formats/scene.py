@@ -42,7 +42,7 @@ def read(path: Path) -> list[Surface]:
             f"{path}: reading {path.suffix} files needs {error.name or COLLADA}: pip install 'tiltprint[dae]'"
         ) from None
     except Exception as error:  # noqa: BLE001 - trimesh has no exception types of its own: any exception means an unreadable file
-        raise MeshError(f"{path}: cannot be read as {path.suffix} ({type(error).__name__}: {str(error)[:200]})") from None
+        raise MeshError(f"{path} cannot be read as {path.suffix} ({type(error).__name__}: {str(error)[:200]})") from None
     if path.suffix.lower() == ".gltf":
         check_extensions(path, json.loads(path.read_bytes()))
     placed = [(matrix, mesh) for matrix, name in nodes if isinstance(mesh := scene.geometry[name], trimesh.Trimesh)]

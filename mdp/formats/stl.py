@@ -39,10 +39,10 @@ def read(path: Path) -> list[Surface]:
     if text.lstrip()[:5].lower() == b"solid" and FACET_START.search(text):
         return [_ascii(path, text)]
     if len(text) < HEADER or b"\0" not in text:
-        raise MeshError(f"{path}: is not an STL file: neither binary nor ASCII with `solid` and `facet` in it")
+        raise MeshError(f"{path} is not an STL file: neither binary nor ASCII with `solid` and `facet` in it")
     if len(text) < HEADER + FACET * count:
         held = (len(text) - HEADER) // FACET
-        raise MeshError(f"{path}: is cut short: it holds {held} of the {count} facets {announced}")
+        raise MeshError(f"{path} is cut short: it holds {held} of the {count} facets {announced}")
     return [_binary(path, text, count)]  # some programs write colours or padding after the facets
 
 

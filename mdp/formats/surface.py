@@ -50,7 +50,7 @@ def check_surface(path: Path, vertices: Any, faces: Any, colours: Indices | None
         positions = np.ascontiguousarray(vertices, dtype=np.float64).reshape(-1, 3)
     surface = Surface(positions, np.ascontiguousarray(faces, dtype=np.int64).reshape(-1, 3), colours)
     if not len(surface.faces):
-        raise MeshError(f"{path}: holds no faces")
+        raise MeshError(f"{path} holds no faces")
     check_vertices(path, positions)
     inside = np.atleast_1d(((surface.faces >= 0) & (surface.faces < len(positions))).all(axis=1))
     if not inside.all():

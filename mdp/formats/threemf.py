@@ -105,7 +105,7 @@ def read_build(path: Path, plate: int | None = None) -> Build:
     try:
         archive = ZipFile(path)
     except DAMAGED_ZIP:
-        raise MeshError(f"{path}: is not a 3MF file: not a zip archive, or one that is cut short") from None
+        raise MeshError(f"{path} is not a 3MF file: not a zip archive, or one that is cut short") from None
     with archive:
         return _Builder(path, archive).build(plate)
 
@@ -188,7 +188,7 @@ class _Builder:
             return plates[0] if plates else None
         if not plates:
             raise MeshError(
-                f"{self._path}: has no plates: {option('plate', wanted)} goes with a file of Bambu Studio or OrcaSlicer"
+                f"{self._path} has no plates: {option('plate', wanted)} goes with a file of Bambu Studio or OrcaSlicer"
             )
         for plate in plates:
             if plate[0] == wanted:
@@ -390,7 +390,7 @@ def _model(archive: ZipFile, name: str) -> Model:
         named = EXTENSION.search(namespace)
         if (named[1] if named else prefix) not in EXTENSIONS and prefix not in ("p", "m"):
             needed = named[1] if named else namespace
-            raise MeshError(f"{archive.filename}: needs the 3MF extension {needed}, which is not read: {PLAIN}")
+            raise MeshError(f"{archive.filename} needs the 3MF extension {needed}, which is not read: {PLAIN}")
     objects = {element.get("id", ""): element for element in reversed(root.findall("{*}resources/{*}object"))}
     painted = tuple(
         what for what, names in PAINTED.items() if any(re.search(rb'%s="[^"]' % name.encode(), content) for name in names)

@@ -43,7 +43,7 @@ MOST_WIDE = 1000  # as search.beam_width allows
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Collect the missing records; returns the exit code."""
-    return command.run(collect, arguments, "started again, the collection goes on where it stopped")
+    return command.run(collect, arguments, "started again, the collection continues where it stopped")
 
 
 def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
@@ -109,7 +109,7 @@ def _rows(out: Path, settings: Settings) -> dict[Key, Row]:
     rows = {row.key: row for row in read_index(out)}
     others = sorted({row.settings for row in rows.values()} - {settings.in_words})
     if others:
-        raise UserError(f"folder {out}: holds searches with {others[0]}, not {settings.in_words}: take another folder")
+        raise UserError(f"folder {out} holds searches with {others[0]}, not {settings.in_words}: take another folder")
     return rows
 
 

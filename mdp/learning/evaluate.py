@@ -30,7 +30,7 @@ SHUFFLES, CUT = 10, 5  # importance is the loss of NDCG@5, averaged over this nu
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Print the tables and draw the figures; returns the exit code."""
-    return run(evaluate, arguments, "nothing is kept, it begins anew")
+    return run(evaluate, arguments, "nothing is kept, it starts again")
 
 
 def evaluate(arguments: Sequence[str] | None) -> None:
@@ -59,7 +59,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     check_range(options, "least_removed", 0.0, 1.0)
     unknown = [name for name in options.without if name not in BASELINES]
     if unknown:
-        raise UserError(f"--without {unknown[0]}: is not a baseline; allowed are {'; '.join(BASELINES)}")
+        raise UserError(f"--without {unknown[0]} is not a baseline; allowed are {'; '.join(BASELINES)}")
     if options.folder is None and options.figure7 is None:
         raise UserError("a folder of records or --figure7 is needed; --help shows what is allowed")
     return options

@@ -124,7 +124,7 @@ def read_lists(
     for ending in [f".{name}.npz" for name in terms] or [".npz"]:
         some = [file for file in known if file.name.endswith(ending)]
         if not some:
-            raise UserError(f"folder {folder}: holds no record (*{ending}); python -m mdp.learning.collect makes them")
+            raise UserError(f"folder {folder} holds no record (*{ending}); python -m mdp.learning.collect makes them")
         files.update(some)
     sources = None if manifest is None else read_sources(manifest)
     lists: list[RatedList] = []
@@ -142,10 +142,10 @@ def read_record(file: Path, columns: Sequence[str] = PAPER_COLUMNS) -> Arrays:
         with np.load(file, allow_pickle=False) as archive:
             arrays: Arrays = dict(archive)
     except (OSError, ValueError, BadZipFile, EOFError) as error:
-        raise UserError(f"record {file}: cannot be read ({error})") from None
+        raise UserError(f"record {file} cannot be read ({error})") from None
     version = int(arrays["version"]) if "version" in arrays else 1
     if version != VERSION:
-        raise UserError(f"record {file}: is of version {version}, only {VERSION} is understood; record the search again")
+        raise UserError(f"record {file} is of version {version}, only {VERSION} is understood; record the search again")
     _check(file, arrays, columns)
     return arrays
 
@@ -153,10 +153,10 @@ def read_record(file: Path, columns: Sequence[str] = PAPER_COLUMNS) -> Arrays:
 def _check(file: Path, arrays: Arrays, columns: Sequence[str]) -> None:
     missing = [name for name in NEEDED if name not in arrays]
     if missing:
-        raise UserError(f"record {file}: holds no {', '.join(missing)}")
+        raise UserError(f"record {file} holds no {', '.join(missing)}")
     absent = [name for name in columns if name not in arrays["columns"]]
     if absent:
-        raise UserError(f"record {file}: has no feature {', '.join(absent)}; it has {', '.join(arrays['columns'])}")
+        raise UserError(f"record {file} has no feature {', '.join(absent)}; it has {', '.join(arrays['columns'])}")
     rows = len(arrays["stage"])
     if arrays["features"].shape != (rows, len(arrays["columns"])) or arrays["outcome"].shape != (rows,):
         raise UserError(f"record {file}: its features, stages and outcomes differ in length")
@@ -226,8 +226,8 @@ def read_sources(manifest: Path) -> dict[str, str]:
         with manifest.open(newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise UserError(f"manifest {manifest}: cannot be read ({error})") from None
+        raise UserError(f"manifest {manifest} cannot be read ({error})") from None
     missing = [name for name in COLUMNS_NEEDED if not rows or not rows[0].get(name)]
     if missing:
-        raise UserError(f"manifest {manifest}: has no column {', '.join(missing)}; {', '.join(COLUMNS_NEEDED)} are needed")
+        raise UserError(f"manifest {manifest} has no column {', '.join(missing)}; {', '.join(COLUMNS_NEEDED)} are needed")
     return {row["id"]: f"{row['source_repo']}/{row['source_path'].rpartition('/')[0]}" for row in rows}

@@ -30,12 +30,12 @@ def model_files(folder: Path, only: str = "", every: int = 1) -> list[Path]:
     Raises UserError for a folder without models, and for two models with the same name.
     """
     if not folder.is_dir():
-        raise UserError(f"folder {folder}: does not exist; a folder of models is expected")
+        raise UserError(f"folder {folder} does not exist; a folder of models is expected")
     kinds = (ARRAYS, *READERS)
     files = sorted(file for file in folder.iterdir() if file.suffix.lower() in kinds and only in file.stem)[::every]
     if not files:
         words = f" with {only!r} in its name" if only else ""
-        raise UserError(f"folder {folder}: holds no model{words}; {', '.join(kinds)} are read")
+        raise UserError(f"folder {folder} holds no model{words}; {', '.join(kinds)} are read")
     for file, next_file in pairwise(files):
         if name_of(file) == name_of(next_file):
             raise UserError(f"folder {folder}: {file.name} and {next_file.name} would have the same records; rename one")
@@ -57,9 +57,9 @@ def read_model(path: Path) -> Mesh:
         with np.load(path) as arrays:
             solid, _ = repair([check_surface(path, arrays["vertices"], arrays["faces"])])
     except (KeyError, ValueError, BadZipFile) as error:
-        raise MeshError(f"{path}: holds no vertices and faces ({error})") from None
+        raise MeshError(f"{path} holds no vertices and faces ({error})") from None
     except OSError as error:
-        raise MeshError(f"{path}: cannot be read ({error})") from None
+        raise MeshError(f"{path} cannot be read ({error})") from None
     low, high = solid.vertices.min(axis=0), solid.vertices.max(axis=0)
     return Mesh(solid.vertices - np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]]), solid.faces.astype(np.int32))
 

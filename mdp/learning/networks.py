@@ -216,4 +216,4 @@ def write(file: Path, content: bytes) -> None:
     try:
         write_whole(file, content, SHARED)
     except OSError as error:
-        raise UserError(f"ranker {file}: cannot be written ({error.strerror})") from None
+        raise UserError(f"ranker {file} cannot be written ({error.strerror})") from None

@@ -76,4 +76,4 @@ def save(figure: Figure, file: Path) -> None:
         file.parent.mkdir(parents=True, exist_ok=True)
         figure.savefig(file, dpi=DOTS, format="png", metadata={"Software": None})
     except OSError as error:
-        raise UserError(f"picture {file}: cannot be written ({error.strerror})") from None
+        raise UserError(f"picture {file} cannot be written ({error.strerror})") from None

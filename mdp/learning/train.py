@@ -94,7 +94,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     for name, least, most in (("rate", 1e-9, 10.0), ("seed", 0, 1e9), ("share", 0.01, 1.0)):
         check_range(options, name, least, most)
     if options.output.is_dir() or not options.output.parent.is_dir():
-        raise UserError(f"ranker {options.output}: cannot be written; a file in a folder that exists is needed")
+        raise UserError(f"ranker {options.output} cannot be written; a file in a folder that exists is needed")
     return options
 
 

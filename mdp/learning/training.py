@@ -1,4 +1,4 @@
-"""Training: steps over shuffled batches of lists until the order of the validation lists improves no more.
+"""Training: steps over shuffled batches of lists until the order of the validation lists no longer improves.
 
 Adam with a limit on the norm of all gradients together. The network with the highest figures on the validation lists is kept. One
 thread, and an order of lists drawn from seed and epoch: equal lists give equal weights.

@@ -70,10 +70,10 @@ def read_searches(table: Path) -> list[TimedSearch]:
             missing = [name for name in NEEDED if name not in (reader.fieldnames or ())]
             rows = list(reader)
         if missing:
-            raise UserError(f"table {table}: has no column {', '.join(missing)}; {', '.join(NEEDED)} are needed")
+            raise UserError(f"table {table} has no column {', '.join(missing)}; {', '.join(NEEDED)} are needed")
         return [_search(row) for row in rows if not row.get("error") and float(row.get("risky_mm2") or 1.0) > 0.0]
     except (OSError, UnicodeDecodeError, ValueError, TypeError, csv.Error) as error:
-        raise UserError(f"table {table}: cannot be read ({error})") from None
+        raise UserError(f"table {table} cannot be read ({error})") from None
 
 
 def _search(row: dict[str, str]) -> TimedSearch:

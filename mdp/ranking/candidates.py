@@ -60,7 +60,7 @@ REASONS = {
     ),
     Reason.KEEP: f"the plane would pass through a zone that stays whole{phrase('', ' ([[keep]])')}",
     Reason.WEAK: f"the nozzle could break the part or a piece of it off its base ({key_name('search.nozzle_load_n')})",
-    Reason.STANDING: "the head would meet what stands beside it",
+    Reason.STANDING: "the head would meet the print beside it",
 }
 
 

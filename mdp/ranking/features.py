@@ -6,9 +6,9 @@ walls and rods, on either side of it), M6 accumulated residual risky area. Areas
 the model's, distances of the radius of its bounding sphere, clipped to 0..1. If seams and stair-stepping have a cost, M1, M2 and
 M6 include it, M6 only the stair-stepping that a cut adds.
 
-The others come from the sweep as well: wasted, the share of the residual that another cut could have saved; hopeless, the share
-that no cut could save, and hopeless_left, that share of the remainder, which is part of every later cost (called unavoidable
-elsewhere; records and rankers keep the old names); risky_left, the area at risk that remains; seam; tilt and turn, the cosines
+The others come from the sweep as well. Three shares of the residual keep the names of older records and rankers: `wasted`
+needs support although another cut could have saved it, `hopeless` is unavoidable overhang in the part, and `hopeless_left` in the
+remainder, which is part of every later cost. risky_left, the area at risk that remains; seam; tilt and turn, the cosines
 between the direction and upright or the previous cut's direction; section and contact, areas as shares of the sphere's great
 circle; extent of the part along its direction; volume_left; cuts made before, in tens; round of the classic ranking's relaxation;
 risky, the model's risky area in great circles; scale, the radius in decimetres.

@@ -58,7 +58,7 @@ class LearnedRanker:
         except Exception as error:  # noqa: BLE001 - onnxruntime's exceptions have no common base
             raise UserError(f"ranker {self.file}: cannot score candidates ({first_line(error)})") from None
         if np.shape(scores) != (len(rows),) or not np.isfinite(scores).all():
-            raise UserError(f"ranker {self.file}: gives no number for each of {len(rows)} candidates")
+            raise UserError(f"ranker {self.file} gives no number for each of {len(rows)} candidates")
         rounded: Floats = np.asarray(np.round(np.asarray(scores, np.float64), DECIMALS), np.float64)
         return rounded
 
@@ -70,10 +70,10 @@ class LearnedRanker:
         unknown = [name for name in columns if name not in FEATURES]
         if not columns or unknown:
             wrong = f"wants the feature {unknown[0]}, which this version does not know" if unknown else "names no features"
-            raise UserError(f"ranker {self.file}: {wrong}; train it anew with this version")
+            raise UserError(f"ranker {self.file}: {wrong}; train it again with this version")
         (given,) = self._session.get_inputs()
         if list(given.shape)[1:] != [len(columns)]:
-            raise UserError(f"ranker {self.file}: takes {given.shape}, {len(columns)} features a candidate are named")
+            raise UserError(f"ranker {self.file} takes {given.shape}, {len(columns)} features a candidate are named")
         return columns
 
     def _features(self, candidates: Sequence[RankedCandidate]) -> Floats:
@@ -99,12 +99,12 @@ class LearnedRanker:
         try:
             session = InferenceSession(self.file.read_bytes(), options, providers=["CPUExecutionProvider"])
         except OSError as error:
-            raise UserError(f"ranker {self.file}: cannot be read ({error.strerror})") from None
+            raise UserError(f"ranker {self.file} cannot be read ({error.strerror})") from None
         except Exception as error:  # noqa: BLE001 - as above
-            raise UserError(f"ranker {self.file}: is not an ONNX file ({first_line(error)})") from None
+            raise UserError(f"ranker {self.file} is not an ONNX file ({first_line(error)})") from None
         named = ([value.name for value in session.get_inputs()], [value.name for value in session.get_outputs()])
         if named != ([INPUT], [OUTPUT]):
-            raise UserError(f"ranker {self.file}: takes {named[0]} and gives {named[1]}; {INPUT} and {OUTPUT} are needed")
+            raise UserError(f"ranker {self.file} takes {named[0]} and gives {named[1]}; {INPUT} and {OUTPUT} are needed")
         return session
 
 

@@ -92,9 +92,14 @@ def _read_as_solid(solid: Surface, notes: list[str]) -> tuple[Surface, "m3.Manif
         tried = change(solid)
         whole = solid_of(tried)
         if abs(whole.volume() - volume_of(tried)) <= SAME_VOLUME * abs(whole.volume()):
-            _note(notes, (len(tried.faces) - len(solid.faces)) // 2, "parted {} edge{} that four faces share")
+            _note(notes, (len(tried.faces) - len(solid.faces)) // 2, "split {} edge{} that four faces share")
             return tried, whole
     return _keep_what_was_read(solid, whole, notes)
+
+
+def _rounded(value: float) -> str:
+    """A value with three significant digits, without an exponent."""
+    return f"{float(f'{value:.3g}'):.12g}"
 
 
 def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) -> tuple[Surface, "m3.Manifold"]:
@@ -110,12 +115,11 @@ def _keep_what_was_read(solid: Surface, whole: "m3.Manifold", notes: list[str]) 
     same = abs(taken_mm3 - enclosed_mm3) <= MOST_CHANGED * taken_mm3 and len(cleaned.faces) > 0
     if not same or np.abs(_bounds(cleaned) - box).max() > SHRINK * (box[1] - box[0]).max():
         raise MeshError(
-            f"cannot be made a valid solid: its faces enclose {enclosed_mm3:.5g} mm³, but the closest valid solid has "
-            f"{taken_mm3:.5g} mm³; make it manifold in another program first (Blender: 3D-Print Toolbox, Make Manifold)"
+            f"cannot be made a valid solid: its faces enclose {_rounded(enclosed_mm3)} mm³, but the closest valid solid has "
+            f"{_rounded(taken_mm3)} mm³; make it manifold in another program first (Blender: 3D-Print Toolbox, Make Manifold)"
         )
-    percent = round(100 * (taken_mm3 / enclosed_mm3 - 1), 4) + 0.0
-    changed = f"{taken_mm3:.6g} mm³ remain of {enclosed_mm3:.6g} mm³ ({percent:+g} %)"
-    notes.append(f"left out folds where more than two faces share an edge: {changed}")
+    percent = float(f"{100 * (taken_mm3 / enclosed_mm3 - 1):.3g}") + 0.0
+    notes.append(f"left out folds where more than two faces share an edge: the volume changes by {percent:+g} %")
     return cleaned, whole
 
 
@@ -165,7 +169,7 @@ def _close_surface(surface: Surface, size: float, gap: float, notes: list[str]) 
     if len(edges.unbalanced):
         where = surface.vertices[edges.starts[np.flatnonzero(edges.edge == edges.unbalanced[0])[0]]]
         raise MeshError(
-            f"is not closed: {counted(len(edges.unbalanced), 'open edge')} that cannot be mended, one at {format_point(where)}"
+            f"is not closed: {counted(len(edges.unbalanced), 'open edge')} that cannot be repaired, one at {format_point(where)}"
         )
     return surface
 

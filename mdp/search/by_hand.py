@@ -297,7 +297,7 @@ def _missed_reason(problem: Problem, node: Node, plane: Plane) -> str | None:
     whole = plane.heights_mm(problem.mesh.vertices) + plane.offset_mm
     if whole.min() < plane.offset_mm - COPLANAR_MM and whole.max() > plane.offset_mm + COPLANAR_MM:
         side = "above" if heights.max() <= COPLANAR_MM else "below"
-        return f"nothing is left {side} its plane, the parts printed after it took it: the order is impossible"
+        return f"nothing is left {side} its plane, later parts have taken it: change the order"
     return (
         f"its plane misses the model: along its normal the model lies between {whole.min():.1f} and {whole.max():.1f} mm, "
         f"{phrase('offset', f'offset_mm is {plane.offset_mm:.6g}', f'{plane.offset_mm:.1f}')}"

@@ -156,10 +156,11 @@ def choose(rows: Sequence[FrontRow], weights: Weights, least_saving: float = 0.0
     of parts.
 
     weights: exchange rates of time and filament. least_saving: the charge, as a share of the first row's cost including time. If
-    any row has a time, rows without one cannot be printed, and unsound rows are not chosen. If none has, or time does not count,
+    any row has a time, rows without one cannot be printed, and flawed rows are not chosen. If none has, or time does not count,
     as without support, there is no charge: the choice is the row with the fewest parts within tolerance of the least cost.
     """
-    pareto_optimal_rows = [place for place, good in enumerate(pareto_optimal(rows)) if good and (place == 0 or rows[place].sound)]
+    unflawed = [place == 0 or not row.flaw for place, row in enumerate(rows)]
+    pareto_optimal_rows = [place for place, good in enumerate(pareto_optimal(rows)) if good and unflawed[place]]
     timed = [place for place in pareto_optimal_rows if rows[place].time_s is not None]
     places, first = timed or pareto_optimal_rows, (timed or pareto_optimal_rows)[0]
     totals = {place: rows[place].cost_mm2 + (weights.of_row(rows[place]) or 0.0) for place in places}
@@ -177,7 +178,9 @@ def choose(rows: Sequence[FrontRow], weights: Weights, least_saving: float = 0.0
         reason = "the lowest cost, time included"
     else:
         reason = f"each further part would save less than {100.0 * least_saving:g} %"
-    return Choice(taken, reason, _savings_notes(rows[scars], rows[taken]) if taken != scars else ())
+    cheapest = min(rows, key=lambda row: row.cost_mm2)
+    worth = cheapest.flaw and cheapest.cost_mm2 < (1.0 - EQUAL) * rows[taken].cost_mm2
+    return Choice(taken, reason, _savings_notes(cheapest if worth else rows[scars], rows[taken]))
 
 
 def _savings_notes(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
@@ -187,9 +190,15 @@ def _savings_notes(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
     parts = fewest_scars.parts
     if saved_mm2 <= 0.0:
         return ()
-    price = f"with {parts - taken.parts} more {'cut' if parts == taken.parts + 1 else 'cuts'}"
-    if longer_s > 0.0:
-        price = f"but take {longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f"but take {longer_s:.0f} s longer"
+    price = f" with {parts - taken.parts} more {'cut' if parts == taken.parts + 1 else 'cuts'}"
+    if fewest_scars.flaw:
+        price = f", but {fewest_scars.flaw}"
+    elif longer_s > 0.0:
+        price = f", but take {longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f", but take {longer_s:.0f} s longer"
     elif more_mm >= 50.0:
-        price = f"but take {more_mm / 1000.0:.1f} m more filament"
-    return (f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm² of visible marks {price}: {advice('parts', parts)}",)
+        price = f", but take {more_mm / 1000.0:.1f} m more filament"
+    less, more = (max(row.support_area_mm2, 0.0) for row in (fewest_scars, taken))
+    support = f" (support on {less:.0f} instead of {more:.0f} mm²)" if round(less) < round(more) else ""
+    return (
+        f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm² of visible marks{support}{price}: {advice('parts', parts)}",
+    )

@@ -121,7 +121,7 @@ def _zone(folder: Path, values: dict[str, Any], key: str, where: str) -> AnyZone
     _only(values, (*ZONE_KEYS, *(("mesh",) if key in MESH_ZONES else ())), where)
     if "mesh" in values:
         if len(values) > 1:
-            raise PlanError(f"{where}has a mesh and {', '.join(values.keys() - {'mesh'})}: one of them is allowed")
+            raise PlanError(f"{where.rstrip(': ')} has a mesh and {', '.join(values.keys() - {'mesh'})}: one of them is allowed")
         return _solid(folder, values, where)
     if "colour" in values:
         return _painted(values, where)
@@ -152,7 +152,7 @@ def _modifiers(folder: Path, table: dict[str, Any]) -> tuple[Modifier, ...]:
         kinds = [kind for kind, keys in MODIFIER_VOLUMES.items() if not keys.isdisjoint(values)]
         if len(kinds) != 1:
             given = " and ".join(kinds) or "no volume"
-            raise PlanError(f"{where}has {given}: one of {', '.join(MODIFIER_VOLUMES)} is expected")
+            raise PlanError(f"{where.rstrip(': ')} has {given}: one of {', '.join(MODIFIER_VOLUMES)} is expected")
         modifiers.append(Modifier(_volume(folder, values, where), _process(values, where)))
     return tuple(modifiers)
 
@@ -180,7 +180,7 @@ def _solid(folder: Path, values: dict[str, Any], where: str) -> MeshVolume:
 
 def _grown(values: dict[str, Any], where: str) -> Grown:
     if not set(values) <= {"point_mm", "angle_deg"}:
-        raise PlanError(f"{where}has a point and a box: one of them is allowed")
+        raise PlanError(f"{where.rstrip(': ')} has a point and a box: one of them is allowed")
     point_mm = _vector(values.get("point_mm"), f"{where}point_mm")
     angle_deg = _number(values.get("angle_deg"), f"{where}angle_deg")
     if not 0.0 <= angle_deg <= MOST_GROWN_DEG:
@@ -191,7 +191,7 @@ def _grown(values: dict[str, Any], where: str) -> Grown:
 def _painted(values: dict[str, Any], where: str) -> Painted:
     if len(values) > 1:
         beside = "a point" if set(values) & {"point_mm", "angle_deg"} else "a box"
-        raise PlanError(f"{where}has a colour and {beside}: one of them is allowed")
+        raise PlanError(f"{where.rstrip(': ')} has a colour and {beside}: one of them is allowed")
     text = values["colour"]
     colour = parse_colour(text) if isinstance(text, str) else None
     if colour is None:
@@ -201,7 +201,7 @@ def _painted(values: dict[str, Any], where: str) -> Painted:
 
 def _brushed(values: dict[str, Any], where: str) -> Brushed:
     if len(values) > 1:
-        raise PlanError(f"{where}has faces and {', '.join(values.keys() - {'faces'})}: one of them is allowed")
+        raise PlanError(f"{where.rstrip(': ')} has faces and {', '.join(values.keys() - {'faces'})}: one of them is allowed")
     try:
         return Brushed(_text(values, "faces"))
     except ValueError as error:

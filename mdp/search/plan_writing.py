@@ -26,7 +26,7 @@ def plan_text(plan: PlanFile, folder: Path | None = None) -> str:
     document["sha256"] = plan.sha256
     if plan.orientation is not None:
         document["orientation"] = [list(row) for row in plan.orientation]
-    parts = (PlannedPart(None, None, "part 1 stands on the platform"), *plan.parts)
+    parts = (PlannedPart(None, None, "part 1 stands on the build plate"), *plan.parts)
     settings = {part.part: part.process for part in plan.settings}
     document["part"] = _tables([_part_table(part, settings.get(k, {})) for k, part in enumerate(parts, start=1)])
     for kind in ZONE_KINDS:

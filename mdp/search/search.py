@@ -14,7 +14,7 @@ from time import perf_counter
 
 from mdp.cost.symmetry import find_mirrors
 from mdp.decomposition import Decomposition, FrontRow, Part
-from mdp.joint import is_sound
+from mdp.joint import flaw_of
 from mdp.kernels.threads import ahead
 from mdp.mesh import Mesh
 from mdp.pedestal import on_pedestal
@@ -63,7 +63,7 @@ class SearchRequest:
     plan: planes that are cut first and stay, and zones; parts: greatest number of parts, None for the cheapest; price: time and
     filament of parts, for the rows of the front and the choice between them; without it a search for one part does nothing.
     on_phase is called with a description of each phase outside the stages; on_record with the record of the search, the content
-    of an .npz file.
+    of an .npz file. needs_front: whether rows with more parts than requested are used.
     """
 
     plan: PlanFile = NO_PLAN
@@ -73,11 +73,12 @@ class SearchRequest:
     on_stage: OnStage = lambda stage, beam, best_share, measure: None
     on_phase: Callable[[str], None] = lambda text: None
     on_record: Callable[[bytes], None] | None = None
+    needs_front: bool = True
 
     @property
     def is_whole(self) -> bool:
         """Whether the model stays in one piece and no front is needed."""
-        return self.parts == 1 and self.price is None and self.on_record is None
+        return self.parts == 1 and (self.price is None or not self.needs_front) and self.on_record is None
 
 
 ANY_PARTS = SearchRequest()
@@ -149,16 +150,16 @@ def _take(
 ) -> tuple[tuple[Part, ...], list[FrontRow], tuple[str, ...]]:
     """Choose among a front: the parts, the front's rows with the chosen one marked, and notes. With request.parts, the row with
     at most that many parts; otherwise the cheapest one, including time if seconds have a cost. best: the choice if seams cost
-    nothing. Unsound rows get no time, so they are chosen only on request.
+    nothing. Flawed rows get no time and are chosen only on request.
     """
     nodes, price, paying = front.nodes, request.price, dict[int, tuple[Part, ...]]()
     rows = [front_row(node) for node in nodes]
     if price is not None:
         paying = {place: make_parts(problem, nodes[place]) for place, good in enumerate(pareto_optimal(rows)) if good}
         by_hand = len(problem.start.cuts)
-        sound = {place: parts for place, parts in paying.items() if is_sound(problem.mesh, parts, problem.profile, by_hand)}
-        rows = [replace(row, sound=place in sound or place not in paying) for place, row in enumerate(rows)]
-        rows = price_rows(rows, sound, price)
+        flaws = {place: flaw_of(problem.mesh, parts, problem.profile, by_hand) for place, parts in paying.items()}
+        rows = [replace(row, flaw=flaws.get(place, "")) for place, row in enumerate(rows)]
+        rows = price_rows(rows, {place: parts for place, parts in paying.items() if not flaws[place]}, price)
     choice = choose(rows, Weights.of(problem.profile), problem.settings.least_saving)
     if request.parts is not None:
         choice = Choice(nodes.index(front.up_to(request.parts)), ASKED)
@@ -339,7 +340,7 @@ def _as_planned(row: FrontRow) -> FrontRow:
 def _priced(
     problem: Problem, plan: PlanFile, rows: Sequence[FrontRow], chosen: tuple[Part, ...], price: Pricing
 ) -> list[FrontRow]:
-    """The rows of a plan's front with time and filament; rows that cannot be cut again or are unsound stay as they are."""
+    """The rows of a plan's front with time and filament; rows that cannot be cut again or are flawed stay as they are."""
     parts: dict[int, Sequence[Part]] = {}
     for place, (row, good) in enumerate(zip(rows, pareto_optimal(rows), strict=True)):
         with suppress(PlanError):
@@ -347,6 +348,6 @@ def _priced(
                 parts[place] = chosen
             elif good:
                 parts[place] = make_parts(problem, cut_by_hand(problem, replace(plan, parts=planned_parts(row))))
-    sound = {place for place, of_row in parts.items() if is_sound(problem.mesh, of_row, problem.profile)}
-    rows = [replace(row, sound=place in sound or place not in parts) for place, row in enumerate(rows)]
-    return price_rows(rows, {place: parts[place] for place in parts if place in sound or rows[place].chosen}, price)
+    flaws = {place: flaw_of(problem.mesh, of_row, problem.profile) for place, of_row in parts.items()}
+    rows = [replace(row, flaw=flaws.get(place, "")) for place, row in enumerate(rows)]
+    return price_rows(rows, {place: parts[place] for place in parts if not flaws[place] or rows[place].chosen}, price)

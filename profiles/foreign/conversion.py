@@ -21,7 +21,7 @@ NO_NUMBER: Converted = (None, "is not a number")
 def no_number(config: Config, key: str) -> Converted:
     """The reason why a setting gives no number."""
     is_of_nozzle = (config.text(key) or "").endswith(OF_NOZZLE)
-    return (None, "a percentage of the nozzle, which the file does not tell") if is_of_nozzle else NO_NUMBER
+    return (None, "a percentage of the nozzle, which the file does not state") if is_of_nozzle else NO_NUMBER
 
 
 def number(config: Config, key: str) -> Converted:
@@ -84,7 +84,7 @@ def part_of(base: str, zero: str = "") -> Convert:
         if part is None:
             return no_number(config, key)
         if whole_value is None:
-            return None, f"a percentage of {base}, which the file does not tell"
+            return None, f"a percentage of {base}, which the file does not state"
         return round(part * whole_value, 6), f"{100.0 * part:g} % of {base} ({whole_value:g})"
 
     return convert
@@ -124,7 +124,7 @@ def width(height: str = "layer_height", auto: float = AUTO_WIDTH) -> Convert:
                 return None, how if name == key else f"0 is {name}, {how}"
         nozzle = config.number("nozzle_diameter")
         if nozzle is None:
-            return None, "0 is by the nozzle, which the file does not tell"
+            return None, "0 is by the nozzle, which the file does not state"
         return round(auto * nozzle, 6), f"0 is {auto:g} nozzles of {nozzle:g} mm"
 
     return convert

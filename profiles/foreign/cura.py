@@ -148,9 +148,9 @@ def read_values(file: Path) -> tuple[Mapping[str, str], str]:
                 values |= _values(ini) if _position(ini) in ("", "0") else {}
             return values, name
     except OSError as error:
-        raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
+        raise ProfileError(f"profile {file} cannot be read ({reason(error)})") from None
     except DAMAGED as error:
-        raise ProfileError(f"profile {file}: is not a Cura profile ({first_line(error)})") from None
+        raise ProfileError(f"profile {file} is not a Cura profile ({first_line(error)})") from None
 
 
 def _of_slicer_file(archive: ZipFile) -> dict[str, str]:

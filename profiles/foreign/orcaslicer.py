@@ -77,7 +77,7 @@ def _inherited(file: Path, document: Mapping[str, Any], below: tuple[Path, ...])
     if beside is None:
         return own, f"inherits {parent}"
     if beside in (file, *below):
-        raise ProfileError(f"profile {file}: inherits itself by way of {parent}")
+        raise ProfileError(f"profile {file} inherits itself through {parent}")
     values, missing = _inherited(beside, read_json(beside), (*below, file))
     return values | own, missing
 
@@ -108,11 +108,11 @@ def read_json(file: Path) -> Mapping[str, Any]:
     try:
         document = json.loads(file.read_text(encoding="utf-8-sig"))
     except OSError as error:
-        raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
+        raise ProfileError(f"profile {file} cannot be read ({reason(error)})") from None
     except (ValueError, RecursionError) as error:
-        raise ProfileError(f"profile {file}: is not JSON ({error})") from None
+        raise ProfileError(f"profile {file} is not JSON ({error})") from None
     if not isinstance(document, dict):
-        raise ProfileError(f"profile {file}: is not a table of settings")
+        raise ProfileError(f"profile {file} is not a table of settings")
     return document
 
 

@@ -106,7 +106,7 @@ def _chosen(presets: Presets, kind: str, wanted: str) -> str:
     names = [name for name in presets[kind] if not name.startswith("*")]
     if wanted:
         if wanted not in presets[kind]:
-            raise ProfileError(f"{KINDS[kind]} preset {wanted!r}: the file has no such one; {_preset_names(names, wanted)}")
+            raise ProfileError(f"{KINDS[kind]} preset {wanted!r}: the file has no such preset; {_preset_names(names, wanted)}")
         return wanted
     active = presets["presets"].get("", {}).get(kind, "").split(";")[0].strip()
     if active in presets[kind]:

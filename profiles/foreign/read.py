@@ -50,7 +50,7 @@ def read_slicer_settings(file: Path) -> SlicerSettings:
             if any(name.startswith("metadata/slic3r") for name in entries):
                 return {}, prusaslicer.of_gcode
     except OSError as error:
-        raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
+        raise ProfileError(f"profile {file} cannot be read ({reason(error)})") from None
     except DAMAGED as error:
         raise ProfileError(f"profile {file}: the settings inside it are damaged ({first_line(error)})") from None
     has_settings = any(name.startswith(OF_CURA) for name in entries)
@@ -84,7 +84,7 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
             return cura.read_profile(file)
         content = _ends(file)
     except OSError as error:
-        raise ProfileError(f"profile {file}: cannot be read ({reason(error)})") from None
+        raise ProfileError(f"profile {file} cannot be read ({reason(error)})") from None
     text = content.decode("utf-8-sig", errors="replace")
     if text.lstrip().startswith("{"):
         return orcaslicer.read_preset(file, orcaslicer.read_json(file))
@@ -99,7 +99,7 @@ def read_config(file: Path, presets: Mapping[str, str] | None = None) -> Config:
     config = prusaslicer.read_settings(text.split("\n"), presets or {})
     if not PRUSA_KEYS & config.entries.keys():
         raise ProfileError(
-            f"profile {file}: holds no settings; a config.ini, a bundle or a G-code file of PrusaSlicer or SuperSlicer, a JSON "
+            f"profile {file} holds no settings; a config.ini, a bundle or a G-code file of PrusaSlicer or SuperSlicer, a JSON "
             "preset of OrcaSlicer or Bambu Studio, a .curaprofile, or a .3mf that one of these has saved is expected"
         )
     return config
@@ -109,7 +109,7 @@ def _of_slicer_file(file: Path) -> Config:
     """The settings inside a slicer file. Raises ProfileError if it has none."""
     values, of_values = read_slicer_settings(file)
     if not values:
-        raise ProfileError(f"{file}: holds no print settings; a .3mf that a slicer has saved with them is expected")
+        raise ProfileError(f"{file} holds no print settings; a .3mf that a slicer has saved with them is expected")
     return of_values(values)
 
 

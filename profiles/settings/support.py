@@ -42,7 +42,7 @@ class Support(Frozen):
     )
     support: Literal["none", "auto", "enforced"] = simple(
         "Support", "supports enable generate support material enforcers only", effect=Effect.FRONT
-    )("auto", "auto: support what the decomposition left risky; enforced: only what overhangs in a plan's [[support]]")
+    )("auto", "auto supports what the decomposition left risky, enforced only what overhangs in a plan's [[support]]")
     support_style: Literal["tree", "grid"] = simple("Support style", "supports tree organic grid snug type")(
         "tree",
         "tree: branches, which save plastic and time; grid: columns straight down where they find ground, sturdier under "

@@ -1,4 +1,4 @@
-"""Support: grown from overhangs down to the ground, trimmed to what stands, with reasons for missing support."""
+"""Support: grown from overhangs down to the ground, trimmed to the reachable area, with reasons for missing support."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

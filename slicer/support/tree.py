@@ -6,7 +6,7 @@ Then, from the top down, each layer's branches are derived from those above, alw
 air.
 
     _____________________________________
-    | hangs               |             |   add_contact: what hangs is cut along squares of CELL_MM, each begins a branch
+    | hangs               |             |   add_contact: the overhang is cut along squares of CELL_MM, each begins a branch
     `------+------+-------+-----.  part |
      \    / \    / \    /       |       |   lower: a wide branch shrinks to its middle, in every layer by the lean,
       \  /   \  /   \  /        |       |

@@ -125,6 +125,12 @@ class Browser:
         """A click on an element, as its own handler gets it."""
         self.value(f"document.querySelector({json.dumps(selector)}).click()")
 
+    def middle(self, selector: str) -> tuple[float, float]:
+        """The middle of an element in the window."""
+        box = f"document.querySelector({json.dumps(selector)}).getBoundingClientRect()"
+        x, y = self.value(f"(({{ x, y, width, height }}) => [x + width / 2, y + height / 2])({box})")
+        return x, y
+
     def press(self, x: float, y: float) -> None:
         """A real mouse click at a place of the page."""
         for kind in ("mouseMoved", "mousePressed", "mouseReleased"):

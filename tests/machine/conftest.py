@@ -1,6 +1,7 @@
-"""What the tests of the workbench's page have, each file its own: a browser and a workbench."""
+"""What tests have, each file its own: a browser, a workbench, and an empty folder."""
 
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -28,3 +29,10 @@ def browser() -> Iterator[Browser]:
 def bench() -> Iterator[Running]:
     with workbench(*QUICK) as running:
         yield running
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder, from which commands are given."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path

@@ -105,7 +105,7 @@ def test_the_text_follows_the_slider_and_the_slider_the_text(page: Browser) -> N
 @pytest.mark.parametrize("lines", [hand.text("generic_ac"), tuple(FOREIGN.split("\n"))], ids=["ours", "foreign"])
 def test_the_page_reads_the_text_out_of_its_rows_letter_for_letter(page: Browser, lines: tuple[str, ...]) -> None:
     profile = program()[0]
-    block = base64.b64encode(of_print("text", Program(lines, dry_run(lines, profile), None), profile)).decode()
+    block = base64.b64encode(of_print("text", Program(lines, dry_run(lines, profile), None), profile, True, (), False)).decode()
     names = "{ ...modules['moves/rows'], ...modules['panel/text'] }"
     read = "linesOfRows({ header: block.header, rows: rowsOf(block), patternOf: block.array('text')[0] })"
     all_of = f"((text) => Array.from({{ length: text.count }}, (_, k) => text.line(k + 1)))({read})"

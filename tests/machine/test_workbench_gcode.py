@@ -31,6 +31,10 @@ def test_a_dropped_file_is_looked_at_and_printed_as_it_is(tmp_path: Path) -> Non
         opened(browser, running, "box.gcode", GOOD)
         assert browser.value(f"{VIEW}.getElementById('title').textContent") == "box.gcode"
         assert "Ready to print" in browser.value("$('gcode-told').textContent")
+        choose(browser, "second.gcode", GOOD.replace("X10", "X12").encode())
+        browser.wait(f"{VIEW}?.getElementById('title')?.textContent === 'second.gcode'")
+        choose(browser, "box.gcode", GOOD.encode())
+        browser.wait(f"{VIEW}?.getElementById('title')?.textContent === 'box.gcode'")
         browser.click("#check")
         browser.wait("!$('run-ask').hidden")
         assert browser.value("$('run-title').textContent") == "box.gcode at the simulated printer"

@@ -243,11 +243,7 @@ def test_the_face_that_is_clicked_lies_on_the_platform(browser: Browser, bench: 
     browser.click("#lay")
     browser.wait("$('rings').hasAttribute('hidden')")  # one of them goes through the middle
     browser.wait("modules['page/store'].store.facets?.facets.length === 6")  # of the hull of a T; no part of its arms' undersides
-    browser.press(
-        *browser.value(
-            "(() => { const b = $('canvas').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
-        )
-    )
+    browser.press(*browser.middle("#canvas"))
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: lay a face down'")
     assert area(browser) == 0.0  # upside down a T needs no support
     assert browser.value("$('lay').getAttribute('aria-pressed')") == "false"
@@ -261,9 +257,7 @@ def test_a_plane_is_dragged_with_its_figures_and_one_that_cannot_be_cut_goes_bac
     browser.click("#add")
     browser.wait("!$('plane').hidden && !$('handles').hidden && $('plane-told').textContent")
     assert browser.value("$('plane-offset').value") == "20.00"
-    x, y = browser.value(
-        "(() => { const b = $('hand-along').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
-    )
+    x, y = browser.middle("#hand-along")
     browser.hold((x, y), (x, y - 20))
     browser.wait("document.documentElement.dataset.triedMs > 0")  # its figures, while the hand holds it
     browser.release((x, y - 20))
@@ -293,9 +287,7 @@ def test_a_plane_dragged_where_it_cannot_be_cut_stays_at_the_last_place_where_it
     browser.click("#fit")
     browser.click("#add")
     browser.wait("!$('handles').hidden && $('plane-told').textContent")
-    x, y = browser.value(
-        "(() => { const b = $('hand-along').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
-    )
+    x, y = browser.middle("#hand-along")
     browser.hold((x, y), (x, y - 30))
     browser.wait("document.documentElement.dataset.triedMs > 0 && Number($('plane-offset').value) > 20.5")
     shown = "[$('plane-offset').value, $('parts-list').children[1].textContent]"

@@ -15,7 +15,6 @@ from tests.shapes import tee
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
 PLACE = "[$('place-x').value, $('place-y').value]"
-KNOB = "(({ x, y, width, height }) => [x + width / 2, y + height / 2])($('hand-place').getBoundingClientRect())"
 STOOD = "JSON.stringify(modules['page/store'].store.state.place_mm)"
 
 
@@ -28,7 +27,7 @@ def open_in_the_middle(browser: Browser, bench: Running, name: str) -> None:
 
 def knob_drawn(browser: Browser) -> tuple[float, float]:
     browser.wait("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(() => drawn(true))))")
-    x, y = browser.value(KNOB)
+    x, y = browser.middle("#hand-place")
     return x, y
 
 

@@ -23,11 +23,10 @@ FREE = "document.documentElement.dataset.busy === ''"
 
 
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
+def folder(folder: Path) -> Path:
     Path("tee.stl").write_bytes(stl(tee()))
     Path("glass.stl").write_bytes(stl(hourglass()))
-    return tmp_path
+    return folder
 
 
 def opened(page: Any, bench: Running, name: str) -> None:
@@ -281,8 +280,7 @@ def test_faces_and_boxes_are_marked_by_clicks_moved_and_taken_away(browser: Brow
         browser.click("#fit")
         browser.value("{ $('mark-kind').value = 'no_seam'; }")
         browser.click("#mark-faces")
-        middle = "(() => { const b = $('canvas').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; })()"
-        browser.press(*browser.value(middle))
+        browser.press(*browser.middle("#canvas"))
         browser.wait("document.querySelectorAll('#marks tr').length === 1 && document.documentElement.dataset.marks")
         assert "faces up to 20°" in browser.value("$('marks').textContent")
         browser.key("Escape")

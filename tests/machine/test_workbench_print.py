@@ -70,7 +70,7 @@ def sliced(folder: Path, key: None) -> Iterator[Running]:
 
 @pytest.mark.parametrize(("port", "sentence"), [
     ("", "no printer is chosen: choose a port, or sim for the simulated one"),
-    ("octoprint:me:secret@host", "server address: names and passwords do not belong into it: keys have a file of their own"),
+    ("octoprint:me:secret@host", "server address: it must not hold a name or password: keys have a file of their own"),
 ])  # fmt: skip
 def test_what_is_no_port_of_a_printer_is_told(sliced: Running, port: str, sentence: str) -> None:
     with prints_line(sliced, "first") as page:
@@ -238,7 +238,7 @@ def test_a_page_prints_on_a_print_server_finds_the_print_again_leaves_it_printin
         browser.click("#leave-printing")
         browser.wait(f"{PRINTING} === 'over'")
         assert (
-            browser.value("$('run-state').textContent") == f"box.stl goes on printing on {address}: this page follows it no more"
+            browser.value("$('run-state').textContent") == f"box.stl keeps printing on {address}: this page no longer follows it"
         )
         assert job.state == "printing"
         type_port(browser, address)
@@ -384,4 +384,4 @@ def test_ctrl_c_at_the_terminal_ends_the_print_first_with_its_heaters_off(sliced
         assert sliced.process.wait(60.0) == 0
         assert (printer.record.nozzle_target_c, printer.record.bed_target_c) == (0.0, 0.0)
     assert ended["said"][-2].endswith("; heaters off")
-    assert ended["said"][-1] == f"tiltprint resume {ended['journal']} goes on with it"
+    assert ended["said"][-1] == f"tiltprint resume {ended['journal']} continues it"

@@ -171,7 +171,7 @@ def refusal(path: Path, **arguments: float) -> str:
     with pytest.raises(MeshError) as caught:
         read_mesh(path, **arguments)
     sentence = str(caught.value)
-    assert sentence.startswith(f"{path}: ")
+    assert sentence.startswith(f"{path}")
     assert not sentence.endswith(".")
     assert "\n" not in sentence
-    return sentence.removeprefix(f"{path}: ")
+    return sentence.removeprefix(f"{path}").lstrip(": ")

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from mdp.cut import Solid, mesh_of
 from mdp.decomposition import Part
-from mdp.joint import Joint, is_sound, joints_of, weakest_of
+from mdp.joint import Joint, flaw_of, joints_of, weakest_of
 from mdp.mesh import Floats
 from tests.slicer.hand import cut, profile
 
@@ -110,7 +110,7 @@ def test_one_piece_has_no_joint() -> None:
 def sound(solid: Solid, *planes: tuple[Sequence[float], float], **search: float) -> bool:
     own = PROFILE.model_copy(update={"search": PROFILE.search.model_copy(update=search)})
     mesh = mesh_of(solid)
-    return is_sound(mesh, cut(mesh, *planes), own)
+    return not flaw_of(mesh, cut(mesh, *planes), own)
 
 
 def test_parts_are_sound_while_their_weakest_joint_bears_the_nozzle_with_the_safety_asked_for() -> None:
@@ -138,10 +138,16 @@ def test_the_papers_terms_know_no_unsound_parts() -> None:
 def test_the_first_part_is_a_share_of_what_a_person_has_left_of_the_model() -> None:
     mesh = mesh_of(m3.Manifold.cube((10.0, 10.0, 100.0)))
     parts = cut(mesh, (UP, 20.0), (UP, 5.0))  # 5 of 20 mm, of 100 mm in all
-    assert [is_sound(mesh, parts, PROFILE, by_hand) for by_hand in (0, 1)] == [False, True]
+    assert [not flaw_of(mesh, parts, PROFILE, by_hand) for by_hand in (0, 1)] == [False, True]
 
 
 def test_a_cut_that_a_person_asked_for_is_not_tested_but_those_beside_it_are() -> None:
     mesh = mesh_of(m3.Manifold.cube((40.0, 40.0, 40.0), True))
     parts = cut(mesh, (UP, 10.0), (UP, -10.0))
-    assert [is_sound(mesh, parts, PROFILE, by_hand) for by_hand in (0, 1, 2)] == [False, False, True]
+    assert [not flaw_of(mesh, parts, PROFILE, by_hand) for by_hand in (0, 1, 2)] == [False, False, True]
+
+
+def test_a_flaw_names_the_part_and_what_is_wrong_with_it() -> None:
+    mesh = mesh_of(m3.Manifold.cube((40.0, 40.0, 40.0), True))
+    assert flaw_of(mesh, cut(mesh, (UP, 0.0)), PROFILE) == "the cut below part 2 surrounds the whole model"
+    assert flaw_of(mesh, cut(mesh, (UP, -16.0)), PROFILE) == "the first part is too small to carry the others"

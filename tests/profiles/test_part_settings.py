@@ -60,3 +60,8 @@ def test_where_the_model_is_cut_and_what_parts_share_is_no_part_s_own() -> None:
     keys = part_keys()
     assert {"walls", "infill_density", "layer_height_mm", "outer_wall_speed_mm_s", "interface_flow"} <= set(keys)
     assert not {"rotate_deg", "self_supporting_angle_deg", "bridge_longest_mm", "skirt_loops", "travel_speed_mm_s"} & set(keys)
+
+
+def test_a_decimal_comma_in_the_setting_of_a_part_is_refused_with_what_to_write() -> None:
+    with pytest.raises(ProfileError, match=r"numbers have a decimal point: 2:layer_height_mm=0\.2,walls=3$"):
+        parse_part_settings("2:layer_height_mm=0,2,walls=3")

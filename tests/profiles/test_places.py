@@ -71,7 +71,7 @@ def test_the_shipped_profile_below_another_is_found_by_way_of_own_ones() -> None
 def test_own_profiles_that_inherit_each_other_are_refused() -> None:
     keep("machine", "a", 'inherits = "b"\n[machine]\nlift_mm = 1\n')
     keep("machine", "b", 'inherits = "a"\n[machine]\nlift_mm = 1\n')
-    with pytest.raises(ProfileError, match="a inherits itself by way of"):
+    with pytest.raises(ProfileError, match="a inherits itself through"):
         load_one("a")
 
 

@@ -173,9 +173,7 @@ def test_a_wrong_value_is_refused_with_key_value_and_what_is_allowed(setting: st
     assert refusal(setting) == sentence
 
 
-@pytest.mark.parametrize(
-    "setting", ["walls=3", "process", "process.walls", "process.=3", "process..walls=3", "printer.walls=3", "=3"]
-)
+@pytest.mark.parametrize("setting", ["process", "process.walls", "process.=3", "process..walls=3", "printer.walls=3", "=3"])
 def test_a_set_option_that_is_no_key_and_value_is_refused(setting: str) -> None:
     expected = f"--set {setting}: KEY=VALUE is expected, where KEY begins with one of machine., material., process., search."
     assert refusal(setting) == expected
@@ -327,7 +325,7 @@ def test_a_file_inherits_from_a_file_beside_it(tmp_path: Path) -> None:
 def test_a_circle_of_files_is_refused(tmp_path: Path) -> None:
     written(tmp_path, 'inherits = "mine.toml"\n[process]\nwalls = 1\n', "other.toml")
     file = written(tmp_path, 'inherits = "other.toml"\n[process]\nwalls = 1\n')
-    with pytest.raises(ProfileError, match=r"mine\.toml inherits itself by way of .*other\.toml"):
+    with pytest.raises(ProfileError, match=r"mine\.toml inherits itself through .*other\.toml"):
         load(process=file)
     assert "inherits itself" in check_file(Path(file))[0]
 
@@ -476,3 +474,14 @@ def test_what_an_earlier_version_has_recorded_is_read_without_the_keys_that_are_
     assert sound_section("process", recorded["process"] | {"wall_colour": "red"}) is None
     with pytest.raises(ProfileError, match="wall_generator"):
         load(settings=["process.wall_generator=classic"])
+
+
+@pytest.mark.parametrize(("setting", "hint"), [
+    ("process.layer_height_mm=0,2", 'process.layer_height_mm is "0,2": it must be a number from 0.02 to 2: write 0.2'),
+    ("layer_height_mm=0.2", "; did you mean process.layer_height_mm?"),
+    ("infill=0.2", "process., search."),
+])  # fmt: skip
+def test_a_setting_with_a_decimal_comma_or_without_its_section_is_refused_with_what_to_write(setting: str, hint: str) -> None:
+    with pytest.raises(ProfileError) as refused:
+        load(settings=[setting])
+    assert str(refused.value).endswith(hint)

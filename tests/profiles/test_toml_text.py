@@ -35,7 +35,7 @@ def test_profiles_may_inherit_by_way_of_others_but_not_without_end(tmp_path: Pat
         (tmp_path / f"{k}.toml").write_text(f'inherits = "{k + 1}.toml"\n[process]\nwalls = 2\n')
     (tmp_path / "40.toml").write_text('inherits = "standard"\n[process]\nwalls = 2\n')
     assert tables("process", str(tmp_path / "20.toml"))["process"]["walls"] == 2
-    with pytest.raises(ProfileError, match="is inherited by way of 32 profiles: at most 32 are allowed"):
+    with pytest.raises(ProfileError, match="is inherited through 32 profiles: at most 32 are allowed"):
         tables("process", str(tmp_path / "0.toml"))
 
 

@@ -38,12 +38,12 @@ def test_the_table_counts_every_row_once_and_names_what_was_not_printed() -> Non
         {"run": "default", "model": name, "status": status, "core_s": "2", "sentence": sentence, "findings": findings}
         for name, status, sentence, findings in (
             ("a.stl", "done", "", "overhang uncalibrated"),
-            ("b.stl", "refused", "b.stl: is empty", ""),
+            ("b.stl", "refused", "b.stl is empty", ""),
         )
     ]
     lines = report(rows).splitlines()
     assert lines[2].startswith("| default | 1 | 1 | 0 |")
-    assert "- default/b.stl: refused: b.stl: is empty" in lines
+    assert "- default/b.stl: refused: b.stl is empty" in lines
     assert lines[-1] == "findings: overhang 1, uncalibrated 1"
 
 

@@ -12,6 +12,8 @@ from functools import partial
 from pathlib import Path
 from statistics import median
 
+import trimesh
+
 from machine.pipeline.choice import pricing
 from machine.pipeline.comparison import best_lying
 from machine.pipeline.pipeline import build
@@ -20,6 +22,7 @@ from mdp.cost.cost import needing_upright
 from mdp.decomposition import Decomposition
 from mdp.directions.orientation import best_orientation, set_on_plate
 from mdp.mesh import Mesh
+from mdp.read import read_mesh
 from mdp.search.orient import orient_and_decompose
 from mdp.search.search import SearchRequest, decompose
 from profiles.errors import UserError
@@ -44,9 +47,8 @@ def bench(given: argparse.Namespace) -> None:
     for file in files(given.models):
         if f"| {file.stem} |" in done:
             continue
-        mesh = harness.standing(str(file), 0.0)
-        if given.longest:
-            mesh = Mesh(mesh.vertices * (given.longest / float((mesh.bounds_mm[1] - mesh.bounds_mm[0]).max())), mesh.faces)
+        scale = given.longest / float(trimesh.load_mesh(file).extents.max()) if given.longest else 1.0
+        mesh, _ = read_mesh(file, scale)
         for cells in rows(mesh, file.stem, settings):
             text = f"| {' | '.join([file.stem, *cells])} |"
             print(text, flush=True)

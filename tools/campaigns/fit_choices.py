@@ -28,7 +28,7 @@ from mdp.cost.cost import weight_of_stairs
 from mdp.cost.footing import BuildPlate
 from mdp.directions.orientation import diameter_mm, set_on_plate
 from mdp.directions.revolution import find_revolution
-from mdp.joint import is_sound
+from mdp.joint import flaw_of
 from mdp.mesh import Floats
 from mdp.overhang import UP, Mask
 from mdp.plane import Plane
@@ -143,7 +143,7 @@ def figures(alternative: dict[str, Any], profile: Profile, problem_of: Callable[
     scars_mm2, stairs_mm2 = sum(cut.cut_cost.seam_mm2 for cut in node.cuts), row.stairs_mm2 / weight_of_stairs(profile)
     support_mm2 = row.cost_mm2 - scars_mm2 - row.stairs_mm2
     costs = (support_mm2, seen_mm, hidden_mm, stairs_mm2, len(node.cuts), price[0], price[1] / 1000.0)
-    shares = (footing.narrow, footing.unsteady, not of_file, askew, not is_sound(problem.mesh, parts, profile))
+    shares = (footing.narrow, footing.unsteady, not of_file, askew, bool(flaw_of(problem.mesh, parts, profile)))
     return {name: round(float(value), 3) for name, value in zip((*COSTS, *SHARES), (*costs, *shares), strict=True)}
 
 

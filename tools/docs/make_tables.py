@@ -16,32 +16,22 @@ from tools.docs.harness import DOCS, marked
 KEYS, STATES = DOCS / "keys.md", DOCS / "states.mmd"
 AXIS = re.compile(r"(?<=^machine)\.(x|y|z|tilt|turn)\.")
 UNIT = re.compile(r", (°C|N|s|deg|g/cm³|mm²|mm|MPa)(/s²|/s)?$|, mm³/s$")
-SHORT = {
-    r"^a (whole )?number from (\S+)$": r"≥ \2",
-    "^a whole number from (.*)": r"\1, whole",
-    "^a number (from )?": "",
-    "above 0 and up to ": "≤ ",
-    "above (\\S+) and up to ": r"> \1, ≤ ",
-    r"(-?[\d.]+) to (-?\d)": r"\1–\2",
-    "true or false": "true/false",
-    "^(a list of|one of|a|one) ": "",
-    "tables with the keys ": "tables of ",
-    '"': "",
-}
+FILLERS = frozenset(["a", "an", "at", "by", "for", "in", "its", "of", "on", "or", "the", "to"])
 
 
 def table(section: str) -> str:
-    """Markdown table of a section's keys: meaning, allowed values, default; keys that differ only in the axis share a row."""
+    """Markdown table of a section's keys: meaning with allowed values, default; keys that differ only in the axis share a row."""
     defaults = getattr(load(), section)
     rows: dict[tuple[str, ...], list[str]] = defaultdict(list)
     for key, field in keys(SECTIONS[section], f"{section}."):
         shown = json.dumps(field.get_default(), default=str) if not field.is_required() else _given(defaults, key)
         stem = AXIS.sub(".*.", key)
-        rows[stem, _beginning(field.description or ""), _short(allowed(field)), "" if stem != key else shown].append(key)
-    lines = ["| key | meaning | allowed | default |", "|---|---|---|---|"]
-    for (_, meaning, values, shown), names in rows.items():
+        meaning = " ".join(filter(None, (_meaning(key, field.description or ""), _choices(allowed(field)))))
+        rows[stem, meaning, "" if stem != key else shown].append(key)
+    lines = ["| key | meaning | default |", "|---|---|---|"]
+    for (_, meaning, shown), names in rows.items():
         default = f"`{shown}`" if shown and shown != "null" else ""
-        lines.append(f"| {_joined(names)} | {meaning} | {values} | {default} |")
+        lines.append(f"| {_joined(names)} | {meaning} | {default} |")
     return "\n".join(lines) + "\n"
 
 
@@ -59,17 +49,24 @@ def _joined(names: list[str]) -> str:
     return f"`{AXIS.sub(f'.{axes}.', names[0]) if axes else names[0]}`"
 
 
+def _meaning(key: str, description: str) -> str:
+    """The beginning of a description; "" if it says no more than the words of the key."""
+    meaning = _beginning(description)
+    stems = {word[:5].rstrip("s") for word in re.findall("[a-z]+", key)}
+    words = set(re.findall("[a-z]+", meaning.lower())) - FILLERS
+    return "" if {word[:5].rstrip("s") for word in words} <= stems else meaning
+
+
 def _beginning(meaning: str) -> str:
     """A meaning up to its first semicolon, or to a colon or bracket behind three words or more, without the unit."""
     found = re.match(r"(?:\S+ ){2}\S+?[^;:(]*(?=[;:(])|[^;]*", meaning)
     return UNIT.sub("", (found[0] if found else meaning).rstrip())
 
 
-def _short(values: str) -> str:
-    """Allowed values without the words that a column of them repeats."""
-    for long, short in SHORT.items():
-        values = re.sub(long, short, values)
-    return values
+def _choices(values: str) -> str:
+    """Allowed values in brackets where they are words to choose from or tables, "" for numbers and texts."""
+    listed = values.removeprefix("one of ").removeprefix("a list of tables with the keys ")
+    return "" if listed == values else f"({listed})".replace('"', "")
 
 
 def diagram() -> str:

@@ -132,7 +132,7 @@ def _work_off(request: BatchRequest, job: Job, files: Mapping[str, Path], rows: 
 def in_words(row: Row) -> str:
     """One line that reports the result of a model."""
     parts = f"{row.parts} part{'s' * (row.parts > 1)}, {duration(row.time_s)}"
-    return f"{row.model}: {row.sentence.removeprefix(f'{row.model}: ') or parts}"
+    return row.sentence if row.sentence.startswith(row.model) else f"{row.model}: {row.sentence or parts}"
 
 
 def same_files(names: Iterable[str]) -> dict[str, str]:
@@ -171,7 +171,7 @@ def reasons(rows: Iterable[Row]) -> list[tuple[str, int]]:
     counts: Counter[str] = Counter()
     for row in rows:
         if row.status != DONE:
-            sentence = row.sentence.removeprefix(f"{row.model}: ")
+            sentence = row.sentence.removeprefix(row.model).lstrip(": ")
             kind = NUMBER.sub("0", sentence.replace(row.model, ""))
             counts[firsts.setdefault(kind, sentence)] += 1
     return counts.most_common(REASONS)

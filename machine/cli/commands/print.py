@@ -30,6 +30,7 @@ from profiles.profile import Profile
 def print_model(request: ModelRequest, port: str, asked: PrintOptions) -> int:
     """Dry-run, then print a model or a G-code file; the printer is identified first. Returns 130 if the user ended or left the
     print."""
+    began_s = monotonic()
     destination, journal = parse_destination(port, asked.baud, asked.speed), asked.journal
     if isinstance(destination, Server) and journal is not None:
         raise ServerError(f"--journal {journal}: {port} prints from a file of its own, which needs no journal here")
@@ -37,12 +38,14 @@ def print_model(request: ModelRequest, port: str, asked: PrintOptions) -> int:
     with open_printer(job, person) as printer:
         loaded = check_print(job, printer)
         show(print_table(loaded.program, loaded.profile))
-        began_s = monotonic()
+        ready_s = monotonic()
         with _watched(loaded, asked.watching, person) as watched:
             end = printer.print(loaded)
             watched.end(end.state)
     if end.state is PrintState.DONE:
-        show(f"done in {duration(monotonic() - began_s)}\n")
+        prepared_s, printed_s = ready_s - began_s, monotonic() - ready_s
+        total = duration(prepared_s + printed_s)
+        show(f"done in {total}: {duration(prepared_s)} before the print, {duration(printed_s)} of printing\n")
     return exit_code(end)
 
 
@@ -93,7 +96,7 @@ def resume(journal: Path, port: str, asked: ResumeOptions, named: Profile | None
     for sentence in cut_off.sentences():
         say(sentence)
     if asked.yes and not cut_off.story.computer_ran_on:
-        raise JournalError(f"journal {journal}: a person must answer that question: resume at a terminal, without --yes")
+        raise JournalError(f"journal {journal}: you must answer that question: resume at a terminal, without --yes")
     rest = rest_of(cut_off)
     with _watched(rest, asked.watching, person) as watched:
         end = print_rest(cut_off, rest, job, person)

@@ -53,17 +53,15 @@ class AtTerminal:
         say_lines(question)
         listed = ", ".join(f"{number}: {choice}" for number, choice in enumerate(choices, 1))
         if choices and (self._yes or not sys.stdin.isatty()):
-            raise JournalError(
-                f"a person must see at which height the tip stands ({listed}): resume at a terminal, without --yes"
-            )
+            raise JournalError(f"you must see at which height the tip stands ({listed}): resume at a terminal, without --yes")
         if choices:
             chosen = _answer(f"which? [{listed}; anything else: none] ")
             return int(chosen) - 1 if chosen in [str(number) for number in range(1, len(choices) + 1)] else None
         if self._yes:
             return 0
         if not sys.stdin.isatty():
-            raise JournalError("whether to go on is asked first: give --yes where there is no terminal to ask at")
-        return 0 if _answer("go on? [y/N] ") in ("y", "yes") else None
+            raise JournalError("resume asks before it continues: give --yes if there is no terminal")
+        return 0 if _answer("continue? [y/N] ") in ("y", "yes") else None
 
     @contextmanager
     def show(self, scene: Scene) -> Iterator[Show]:
@@ -147,6 +145,8 @@ def _screen(scene: Scene, board: Keyboard) -> Iterator[Callable[[PrintStatus], N
 
 def status_line(status: PrintStatus) -> str:
     """The status of a print in one line."""
+    if status.state is PrintState.CANCELLING:
+        return f"{status.state}" + (f"; {status.message}" if status.message else "")
     phrases = [f"{100 * status.share:.0f} %"] if status.share is not None else []
     if status.share is None and (status.total is not None or status.acknowledged):
         phrases.append(f"line {status.acknowledged}")
@@ -156,7 +156,7 @@ def status_line(status: PrintStatus) -> str:
         phrases.append(f"layer {status.layer}")
     nozzle, bed = status.temperature.nozzle_c, status.temperature.bed_c
     if nozzle is not None:
-        old = f" as last known {status.heat_age_s:.0f} s ago" if status.heat_is_old else ""
+        old = f" as last known {status.heat_age_s:.0f} s ago" if _is_outdated(status) else ""
         phrases.append(f"nozzle {nozzle:.0f} °C" + (f", bed {bed:.0f} °C" if bed is not None else "") + old)
     if status.left_s is not None:
         phrases.append(f"{duration(status.left_s)} left")
@@ -199,7 +199,7 @@ def _of(count: int | None) -> str:
 
 def _heat(status: PrintStatus) -> Text:
     heat = status.temperature
-    old = [f"as last known {status.heat_age_s:.0f} s ago:"] if status.heat_is_old and heat.words else []
+    old = [f"as last known {status.heat_age_s:.0f} s ago:"] if _is_outdated(status) and heat.words else []
     phrases = [
         f"{name} {now_c:.1f}" + (f" / {target_c:.0f}" if target_c is not None else "") + " °C"
         for name, now_c, target_c in (("nozzle", heat.nozzle_c, heat.nozzle_target_c), ("bed", heat.bed_c, heat.bed_target_c))
@@ -208,6 +208,11 @@ def _heat(status: PrintStatus) -> Text:
     overrides = [f"feed {status.feed_percent:.0f} %", f"flow {status.flow_percent:.0f} %"]
     shifted = [f"Z offset {status.z_offset_mm:+g} mm"] if status.z_offset_mm else []
     return _phrases_line([*old, *phrases, *overrides, *shifted])
+
+
+def _is_outdated(status: PrintStatus) -> bool:
+    """Whether the age of the temperatures is to be shown."""
+    return status.heat_is_old and status.heat_age_s >= 1.0
 
 
 def _bar(status: PrintStatus) -> RenderableType:

@@ -21,9 +21,9 @@ STEP_MM = 0.01
 LOOK_S = 0.05
 HINT_S = 10.0  # a question expires after this time
 ALONE_S = 2.0  # time for a second interrupt if no keys can be pressed
-SURE = "cancel this print? c or y: heaters off and end; any other key: go on"
-CANCELLING = "cancel this print? c or y: the server ends it; any other key: go on"
-LEAVING = "the print goes on without this program. c or Ctrl-C: cancel it, l: leave it printing; any other key: go on following"
+SURE = "cancel this print? c or y: heaters off and end; any other key: continue"
+CANCELLING = "cancel this print? c or y: the server ends it; any other key: continue"
+LEAVING = "the print continues without this program. c or Ctrl-C: cancel it, l: leave it printing; any other key: keep following"
 MORE = "q does not quit: a print left alone stops feeding. c cancels it (Ctrl-C too), e twice stops the machine at once (M112)"
 STOP = "emergency stop: e once more within a second (M112, the machine halts)"
 STOP_S = 1.0  # the second press of the emergency stop comes within it: a single one may be a slip
@@ -86,7 +86,7 @@ class Keyboard:
         if asked:
             self._explain()
         else:
-            say(f"the print goes on at {self._server}: interrupt again within {ALONE_S:g} s to cancel it")
+            say(f"the print continues at {self._server}: interrupt again within {ALONE_S:g} s to cancel it")
 
     def left(self) -> bool:
         """Whether the user has left the server printing, by l or by a Ctrl-C without an answer."""

@@ -120,8 +120,8 @@ Settings = Annotated[
 ]
 JsonFile = Annotated[Path | None, option("--json FILE", "write the result as JSON; - for standard output")]
 HtmlFile = Annotated[Path | None, option("--html FILE", "page to write for a browser, see view")]
-Force = Annotated[bool, option("--force", "go on although the dry run found errors")]
-ForceAll = Annotated[bool, option("--force", "go on although dry run, printer, machine and program do not agree")]
+Force = Annotated[bool, option("--force", "continue although the dry run found errors")]
+ForceAll = Annotated[bool, option("--force", "continue although dry run, printer, machine and program do not agree")]
 LogFile = Annotated[
     Path | None, option("--log FILE", "log of what is sent and received; default: a new file in the state folder")
 ]
@@ -253,7 +253,7 @@ def named_models(models: list[str]) -> list[str]:
             continue
         name, count = counted.groups()
         if not re.fullmatch(r"[0-9]{1,9}", count) or not 1 <= int(count) <= MOST_COPIES:
-            raise PlanError(f"{text}: the number of copies behind {name}: must be a whole number from 1 to {MOST_COPIES}")
+            raise PlanError(f"{text}: the number of copies behind {name} must be a whole number from 1 to {MOST_COPIES}")
         named += int(count) * [name]
     return named
 

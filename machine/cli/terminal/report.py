@@ -88,7 +88,7 @@ def front_table(front: "Sequence[FrontRow]") -> str:
         for row in front
     ]
     head, *lines = table(rows).splitlines()
-    reasons = [row.chosen * f"  chosen: {row.reason}" for row in front]
+    reasons = [f"  chosen: {row.reason}" if row.chosen else row.flaw and f"  only on request: {row.flaw}" for row in front]
     return "\n".join([head, *(line + reason for line, reason in zip(lines, reasons, strict=True))]) + "\n"
 
 

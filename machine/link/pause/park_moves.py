@@ -167,13 +167,14 @@ def return_moves(profile: Profile, printed: Printed, way: Turn) -> list[str]:
     return [f"G0 Z{height:.3f} F{rise:.0f}", f"G0 X{goal[0]:.3f} Y{goal[1]:.3f} F{across:.0f}", *down]
 
 
-def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequence[str]) -> list[str]:
-    """Way back for a firmware that lost its position: set the axes, run `heat`, lift the tip, home X and Y, return_moves().
+def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequence[str], z_offset_mm: float = 0.0) -> list[str]:
+    """Way back for a firmware that lost its position: set the axes, run `heat`, lift the tip, home X and Y, set the Z offset that
+    the way starts with, return_moves().
 
     machine.gcode.resume replaces the homing if the profile has it. Raises JournalError, MoveError, ProfileError.
     """
     machine, dialect = profile.machine, dialect_of(profile.machine)
-    height = _clear_z_mm(profile, printed, way.start)
+    height = _clear_z_mm(profile, printed, way.start) + max(0.0, z_offset_mm)  # the print is higher than programmed
     values = resume_placeholders(machine, way.at_mm, way.start, height)
     named = key_name("machine.gcode.resume")
     if machine.gcode.resume:
@@ -183,7 +184,8 @@ def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequ
         homing = fill_block("\n".join((*dialect.stands, *heat, rise, "G28 X Y")), named, values, dialect)
     raised = replace(way, at_mm=np.array([*way.at_mm[:2], height]))
     after = heat if machine.gcode.resume else ()
-    return ["G21", "G90", *homing, *after, *return_moves(profile, printed, raised)]
+    offset = [dialect.babystep.format(f"{z_offset_mm:.3f}")] if z_offset_mm else []
+    return ["G21", "G90", *homing, *after, *offset, *return_moves(profile, printed, raised)]
 
 
 def _clear_z_mm(profile: Profile, printed: Printed, pose: Pose) -> float:

@@ -120,7 +120,7 @@ class Pause:
         if not self.off or self.profile is None:
             return why
         minutes = self.profile.machine.pause_cools_after_min
-        cooled = f"the nozzle was switched off after {minutes:g} min; when the print goes on it is {self._heating()}"
+        cooled = f"the nozzle was switched off after {minutes:g} min; when the print continues it is {self._heating()}"
         return f"{why}; {cooled}" if why else cooled
 
     def _heating(self) -> str:

@@ -6,7 +6,7 @@ LONGEST_LINE = 4096  # an endless line is discarded beyond this; Marlin's longes
 TAIL_S = 0.25  # the second line of an error follows at once; 300 characters take this long at 9600 baud
 READABLE = frozenset(b"\t\n\r") | frozenset(range(32, 127))
 ENOUGH_BYTES = 8  # fewer may be the noise of a cable being plugged in
-RUBBISH_SHARE = 0.2  # a wrong baud rate garbles most bytes, a noisy line a few in a hundred
+GARBLED_SHARE = 0.2  # a wrong baud rate garbles most bytes, a noisy line a few in a hundred
 
 
 class LineDecoder:
@@ -24,15 +24,15 @@ class LineDecoder:
         return bool(self._held)
 
     @property
-    def rubbish(self) -> bool:
+    def is_garbled(self) -> bool:
         """Whether the bytes so far are garbled as by a wrong baud rate."""
         enough = self._bytes >= ENOUGH_BYTES and not self._understood
-        return enough and self._unreadable >= RUBBISH_SHARE * self._bytes
+        return enough and self._unreadable >= GARBLED_SHARE * self._bytes
 
     @property
     def foreign(self) -> str:
         """The last line of something readable that does not speak like a printer; "" for none."""
-        return "" if self._understood or self.rubbish else self.last
+        return "" if self._understood or self.is_garbled else self.last
 
     def receive(self, data: bytes, now_s: float) -> list[Event]:
         """The events of received bytes; a line ends with a newline, a carriage return or both."""

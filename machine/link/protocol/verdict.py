@@ -7,14 +7,14 @@ from profiles.errors import FirmwareError, PrinterError, SilenceError
 from profiles.messages import advice
 
 SYNC_TRIES = 6  # a board that resets on opening spends one or two of them in its boot loader
-RUBBISH_TRIES = 2  # boot loaders have baud rates of their own; later bytes are the firmware's
-LOST = "position and temperatures are lost, the print cannot go on"
+GARBLED_TRIES = 2  # boot loaders have baud rates of their own; later bytes are the firmware's
+LOST = "position and temperatures are lost, the print cannot continue"
 
 
 def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: str = "") -> PrinterError | None:
     """The error after `tries` greetings, None while another makes sense. heard: what came instead of an answer."""
     at = "this baud rate" if baud is None else f"{baud} baud"
-    if tries >= RUBBISH_TRIES and decoder.rubbish:
+    if tries >= GARBLED_TRIES and decoder.is_garbled:
         others = ", ".join(str(rate) for rate in BAUDS if rate != baud)
         return PrinterError(
             f"the bytes received at {at} are garbled: the printer speaks at another rate, {advice('baud', others, 'try')}"
@@ -22,10 +22,10 @@ def failed_greeting(decoder: LineDecoder, tries: int, baud: int | None, heard: s
     if tries < SYNC_TRIES:
         return None
     if decoder.foreign:
-        text = f"what answers there is no printer that this program knows: to {tries} greetings it said {decoder.foreign[:60]!r}"
+        text = f"a device answers that is not a known printer: to {tries} greetings it sent {decoder.foreign[:60]!r}"
         return PrinterError(text)
     if heard:
-        return PrinterError(f"the printer did not take {tries} greetings: the last that it said was {heard[:60]!r}")
+        return PrinterError(f"the printer did not accept {tries} greetings: its last answer was {heard[:60]!r}")
     return SilenceError(
         f"the printer did not answer {tries} greetings (M110, M115 with line numbers): it may be off, or speak at another "
         f"rate than {at}"
@@ -36,7 +36,7 @@ def no_line_numbers() -> PrinterError:
     """The error for a printer that answers only lines without numbers."""
     return PrinterError(
         "the printer answers M115, but neither M110 nor any line with a number and a checksum: this program sends no other "
-        "lines, for a damaged one could not be detected"
+        "lines, because a damaged one could not be detected"
     )
 
 
@@ -57,14 +57,14 @@ def firmware_fault(text: str) -> PrinterError:
 
 def torn_line(line: int) -> PrinterError:
     """The error for part of a line executed without number and checksum."""
-    return PrinterError(f"the printer ran part of a torn line after line {line}: what it did is not known")
+    return PrinterError(f"the printer ran part of a torn line after line {line}: its effect is unknown")
 
 
 def lost_answer(line: int, command: str, firmware: str) -> PrinterError:
     """The error for an unanswered line when the firmware never requests a resend."""
     return PrinterError(
         f"line {line} ({command}) was not answered, and {firmware} never asks for a lost line again: "
-        "whether it was done is not known"
+        "whether it was executed is unknown"
     )
 
 

@@ -82,7 +82,7 @@ class Duet(PrintServer):
         if value.get("err") == 2:
             raise ServerError(f"{self.name} serves as many others as it can: close a web page or program that is connected to it")
         if value.get("err") != 0:
-            raise ServerError(f"{self.name} is no Duet: it does not answer rr_connect as one")
+            raise ServerError(f"{self.name} is not a Duet: it does not answer rr_connect as one")
         self._connected = True
         key = whole(value.get("sessionKey"))
         if key:  # firmware from 3.5; earlier, and with DuetSoftwareFramework, a session belongs to this computer's address

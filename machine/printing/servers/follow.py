@@ -19,14 +19,16 @@ from machine.link.pending_commands import (
     Command,
     Control,
     PendingCommand,
+    kept_settings,
     offset_refusal,
     offset_undone,
     percent_refusal,
+    percents_undone,
 )
 from machine.link.print_state import PrintState, PrintStatus, last_known
 from machine.link.protocol.events import Temperature
 from machine.printing.servers.server import PrintServer
-from profiles.errors import NoAnswerError, ServerError
+from profiles.errors import NoAnswerError, ServerError, add_words
 
 POLL_S, TURN_S = 1.0, 0.05
 SHOW_S = 0.25  # refresh interval; a question to the user appears beside the display
@@ -34,8 +36,11 @@ JOIN_S = 0.5  # an order that still waits for its answer then is left to the ser
 BEGIN_S = 15.0  # a server that has accepted a start shows it within this time
 QUIET_S = 15.0  # silence after which it is reported
 LOST_S = 120.0  # silence after which the state of the print counts as unknown
-UNKNOWN = "whether the print goes on there is not known"
+UNKNOWN = "whether the print continues there is unknown"
 UNCONFIRMED = "emergency stop: {server} did not confirm it: cut the power ({error})"
+UNHEARD_SHIFT = (
+    "sent {command}, but {server} does not say whether the firmware knows it (Marlin needs BABYSTEPPING): see that the tip moves"
+)
 OnStatus = Callable[[PrintStatus, str], None]  # with a message for the user, "" for none
 
 
@@ -60,7 +65,7 @@ class Follower:
         # Status, error of a later request, and time of the newest answer: the polling thread replaces them together.
         self._heard: tuple[PrintStatus | None, ServerError | None, float] = (None, None, time.monotonic())
         self._over = threading.Event()
-        self._orders: deque[Callable[[], None]] = deque()
+        self._orders: deque[Callable[[], str | None]] = deque()  # they return a message for the user
         self._message = ""
         self._last_active: PrintState | None = self.running.state if self.running else None
         self._read, self._heat = 0, Temperature()
@@ -83,20 +88,37 @@ class Follower:
             return PrintState.FAILED
         try:
             end = self._followed()
-        except ServerError:
+        except ServerError as error:
             if self._take_requests():
                 return PrintState.FAILED
+            if self.kept:
+                add_words(error, self.kept)
             raise
         if end is not PrintState.FAILED and self._take_requests():
             return PrintState.FAILED
-        self._undo_offset(end)
+        if end in (PrintState.DONE, PrintState.CANCELLED):  # a print that is left still needs its settings
+            self._undo_settings()
         return end
 
-    def _undo_offset(self, end: PrintState) -> None:
-        """Take back a Z offset that the firmware would keep for the next print; a print that is left still needs it."""
-        if self._offset_mm and end in (PrintState.DONE, PrintState.CANCELLED) and self.babystep.endswith(KEEPS_OFFSET):
-            with suppress(ServerError):
+    @property
+    def kept(self) -> str:
+        """A sentence on the user's settings that the firmware keeps for the next print; "" for none."""
+        return kept_settings(*self._feed_and_flow, self._offset_mm, self.babystep)
+
+    def _undo_settings(self) -> None:
+        """Take back the settings that the firmware would keep for the next print, as far as the server accepts it."""
+        with suppress(ServerError):
+            for command in percents_undone(*self._feed_and_flow):
+                self.server.command(command)
+            self._percents.clear()
+            if self._offset_mm and self.babystep.endswith(KEEPS_OFFSET):
                 self.server.command(offset_undone(self._offset_mm, self.babystep))
+                self._offset_mm = 0.0
+
+    @property
+    def _feed_and_flow(self) -> tuple[float, float]:
+        """Feed and flow as ordered here, per cent."""
+        return self._percents.get(Command.FEED, 100.0), self._percents.get(Command.FLOW, 100.0)
 
     def _followed(self) -> PrintState:
         works = (self._poll, self._carry_out)
@@ -134,7 +156,7 @@ class Follower:
         if silent_s > LOST_S:
             where = error or self.server.name
             heat = last_known(self._heat, silent_s)
-            raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may go on, look at the printer{heat}")
+            raise ServerError(f"{where}; no answer for {silent_s:.0f} s: the print may continue: look at the printer{heat}")
         if status is None:
             return None
         quiet = error is not None or silent_s > QUIET_S
@@ -151,7 +173,7 @@ class Follower:
         self._heat = heat if heat.words else self._heat
         if status.state.is_printing:
             if self._last_active is not None and status.file not in ("", self.file):
-                raise ServerError(f"{self.server.name} prints {status.file} now: what became of {self.file} is not known")
+                raise ServerError(f"{self.server.name} prints {status.file} now: what happened to {self.file} is unknown")
             self._last_active, self._read = status.state, max(self._read, status.bytes_read or 0)
             return None
         if status.state is PrintState.OFFLINE or (status.state is PrintState.FAILED and self._last_active is not None):
@@ -210,7 +232,7 @@ class Follower:
                 self._orders.append(order)
         return False
 
-    def _order(self, request: PendingCommand) -> Callable[[], None] | None:
+    def _order(self, request: PendingCommand) -> Callable[[], str | None] | None:
         command, value = request.command, request.value
         if command in (Command.FEED, Command.FLOW):
             self._message = percent_refusal(value, FEED_PERCENT if command is Command.FEED else FLOW_PERCENT) or ""
@@ -242,10 +264,12 @@ class Follower:
         self.server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")
         self._percents[command] = value
 
-    def _shift(self, by_mm: float) -> None:
-        """Shift Z. A refused order does not count, one without an answer may have been executed."""
+    def _shift(self, by_mm: float) -> str:
+        """Shift Z; returns a message if the server does not say whether the firmware has done it. A refused order does not count,
+        one without an answer may have been executed."""
+        command = self.babystep.format(f"{by_mm:.3f}")
         try:
-            self.server.command(self.babystep.format(f"{by_mm:.3f}"))
+            self.server.command(command)
         except NoAnswerError:
             self._offset_mm = round(self._offset_mm + by_mm, 3)
             raise
@@ -253,12 +277,13 @@ class Follower:
             self._refused_mm += by_mm
             raise
         self._offset_mm = round(self._offset_mm + by_mm, 3)
+        return UNHEARD_SHIFT.format(command=command, server=self.server.name) if self.server.hides_answers else ""
 
     def _with_percents(self, status: PrintStatus) -> PrintStatus:
         status = replace(status, z_offset_mm=self._offset_mm)
         if self.server.tells_percents:
             return status
-        feed, flow = (self._percents.get(command, 100.0) for command in (Command.FEED, Command.FLOW))
+        feed, flow = self._feed_and_flow
         return replace(status, feed_percent=feed, flow_percent=flow)
 
     def _carry_out(self) -> None:
@@ -274,7 +299,6 @@ class Follower:
             while self._orders:
                 order = self._orders.popleft()
                 try:
-                    order()
-                    self._message = ""
+                    self._message = order() or ""
                 except ServerError as error:
                     self._message = f"{error}"

@@ -155,9 +155,9 @@ class HttpSession:
         for piece in answer.iter_bytes():
             body += piece
             if time.monotonic() > until_s:
-                raise NoAnswerError(f"{self.name} does not come to the end of its answer: it is no print server")
+                raise NoAnswerError(f"{self.name} sends an answer without an end: it is not a print server")
             if len(body) > MOST_BYTES:
-                raise ServerError(f"{self.name} answers with more than {MOST_BYTES // 1_000_000} MB: it is no print server")
+                raise ServerError(f"{self.name} answers with more than {MOST_BYTES // 1_000_000} MB: it is not a print server")
         return body
 
     def _log(self, direction: str, text: str) -> None:

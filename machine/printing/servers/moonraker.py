@@ -51,7 +51,7 @@ class Moonraker(PrintServer):
         """Its version; axes, limits, steppers and commands if its Klipper is ready."""
         server = table(self._get("/server/info"))
         if "klippy_state" not in server:
-            raise ServerError(f"{self.name} is no Moonraker: it does not answer /server/info as one")
+            raise ServerError(f"{self.name} is not a Moonraker: it does not answer /server/info as one")
         text = f"Moonraker {server.get('moonraker_version') or ''}".strip()
         if server["klippy_state"] != "ready":
             return Identity(text, Answer(Kind.PRINTER, f"{NAME}Klipper"))

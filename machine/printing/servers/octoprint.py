@@ -35,13 +35,14 @@ class OctoPrint(PrintServer):
     """An OctoPrint as a PrintServer."""
 
     key_header = "X-Api-Key"
+    hides_answers = True  # its REST API shows neither answers nor capabilities of the firmware
 
     def greet(self) -> Identity:
         """Its version; the API does not report the firmware."""
         value = self._get("/api/version", "to say who it is")
         text = value.get("text") if isinstance(value, dict) else None
         if not isinstance(text, str) or not text.startswith("OctoPrint"):
-            raise ServerError(f"{self.name} is no OctoPrint: it does not answer /api/version as one")
+            raise ServerError(f"{self.name} is not an OctoPrint: it does not answer /api/version as one")
         if "moonraker" in text.lower():
             raise ServerError(f"{self.name} is a Moonraker that speaks as OctoPrint: use moonraker:HOST")
         return Identity(text)

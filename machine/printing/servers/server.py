@@ -89,6 +89,7 @@ class PrintServer(HttpSession, ABC):
     """A print server. All methods raise ServerError; status() and orders may come from any thread."""
 
     tells_percents = False  # whether status() reports feed and flow
+    hides_answers = False  # whether it keeps the firmware's answers to itself: an unknown command then seems to be carried out
     babystep = ""  # its firmware's command for {} mm of Z; "": that of the machine's profile
 
     @abstractmethod

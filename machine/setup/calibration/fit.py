@@ -34,7 +34,7 @@ ROUNDS = 40
 STEP = 1e-4
 PULL = 0.01  # touches are some hundredths of a mm off, a profile's numbers some mm
 LITTLE = 1e-7  # a sum of squares that falls by a smaller fraction has converged
-HOPELESS = 400.0  # times the mean square of the best signs: no further fit for such signs
+UNPROMISING = 400.0  # times the mean square of the best signs: no further fit for such signs
 SETTLED = 1e-7  # mm and deg: smaller changes mean convergence
 LEAST_SHARE = 1e-4  # a number that moves no touch by this fraction of its change is undetermined
 APART = 4.0  # ratio by which the next best signs must fit worse
@@ -203,7 +203,7 @@ def _best(machine: Machine, touches: Sequence[Touch], mark_height_mm: float, dir
         if min(cost for cost, _ in best) < GOOD_MM**2:
             break
     if directions:
-        worth = HOPELESS * min(cost for cost, _ in best)
+        worth = UNPROMISING * min(cost for cost, _ in best)
         for k, candidate in enumerate(signed):
             cost, numbers = best[k]
             if cost <= worth:

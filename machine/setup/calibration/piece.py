@@ -92,7 +92,7 @@ def read_piece(program: ParsedProgram, machine: Machine, name: str) -> Piece:
     leans = np.degrees(np.arccos(np.clip([pad.ways[2, 2] for pad in pads], -1.0, 1.0)))
     alike = leans.min() >= LEAST_LEAN_DEG and np.ptp(leans) <= EVEN_DEG
     if level < np.cos(np.radians(EVEN_DEG)) or (np.abs(quarters - 90.0) > EVEN_DEG).any() or not alike:
-        raise ProfileError(f"{name} is no program of demo:calibration: its parts lie otherwise")
+        raise ProfileError(f"{name} is not a program of demo:calibration: its parts are placed differently")
     return Piece(machine, poses[1], pads)
 
 

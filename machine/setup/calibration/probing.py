@@ -313,7 +313,7 @@ class Measuring:
             if near and exact:
                 return centre
             share = WIDE if near else share
-        raise PrinterError(f"at {self._name(pose)} the ball's centre is not found: it comes to lie elsewhere each time")
+        raise PrinterError(f"at {self._name(pose)} the ball's centre is not found: it differs each time")
 
     def _contact(self, pose: Pose, place: Floats, expected: float, above_mm: float, exact: bool) -> Floats:
         """(3,) contact at a place, expected at a height and approached from another; exact: two contacts must agree."""

@@ -56,7 +56,7 @@ def factors(profile: Profile, given: Sequence[str] = ()) -> tuple[Factor, ...]:
         return _checked(profile, usual)
     if len(given) > MOST_FACTORS:
         raise ProfileError(
-            f"{option('vary')} is given {len(given)} times: {JOINTS} bars can tell {MOST_FACTORS} settings apart at most"
+            f"{option('vary')} is given {len(given)} times: {JOINTS} bars can distinguish at most {MOST_FACTORS} settings"
         )
     asked = {}
     for text in given:

@@ -77,7 +77,7 @@ def evaluate(sheet: Sheet) -> Outcome:
         raise ProfileError(f"{len(rows)} loads are too few for {sought} numbers: at least {sought + LEAST_FREEDOM} are needed")
     design = np.array([_row(bar, plate, plates, others, levels) for bar, plate, _ in rows])
     if np.linalg.matrix_rank(design) < sought:
-        raise ProfileError("the loads do not tell the settings apart: those of more jointed bars, 1 to 8, are needed")
+        raise ProfileError("the loads do not distinguish the settings: those of more jointed bars, 1 to 8, are needed")
     found, *_ = np.linalg.lstsq(design, logarithms, rcond=None)
     scatter = sqrt(float(np.sum((logarithms - design @ found) ** 2)) / freedom)
     sigma = scatter * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))

@@ -65,7 +65,7 @@ def read(config: ConfigText) -> Found:
     remarks: list[str] = []
     axes = _linear(sections, remarks)
     if sections.missing:
-        remarks.append(f"{', '.join(sections.missing)} is not beside it: what stands there is not known")
+        remarks.append(f"{', '.join(sections.missing)} is not beside it: its settings are unknown")
     registered = _registered(sections)
     steppers, doubtful = _steppers(sections, registered, remarks)
     as_axes = any(stepper in registered for stepper in steppers.values())

@@ -207,7 +207,7 @@ def _read_commands(config: ConfigText) -> Found:
     if name := NAME.search(config.text):
         board.name = name[1]
     if missing:
-        board.remarks.append(f"{', '.join(missing)} is not beside it: what stands there is not known")
+        board.remarks.append(f"{', '.join(missing)} is not beside it: its settings are unknown")
     if unread:
         board.remarks.append(f"what it has in braces ({unread}) only the board works out: {option('port')} duet:HOST asks it")
     return board.found(config.name, "M669", "M566", "M143")

@@ -26,7 +26,7 @@ SAFE = ("GET", "HEAD")
 REFUSED_SOCKET = 1008  # policy violation, RFC 6455
 FOREIGN = "this page is for this computer only\n"
 LONG_NUMBER = re.compile(r"/\d{17}\d*(/|$)")  # not in any path here: keys are 16 hexadecimal digits, sometimes all decimal
-UNKNOWN = "this page is at the address that tiltprint has told, which is another one with each start\n"
+UNKNOWN = "open the address that tiltprint printed at its start: it changes each time\n"
 
 Headers = Iterable[tuple[bytes, bytes]]
 

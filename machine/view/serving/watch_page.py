@@ -28,12 +28,7 @@ if TYPE_CHECKING:
 LAST_WORD_S = 2.0  # an open page polls twice in this time, so it sees how the print ended
 GRACE_S = 1  # for pending answers when the print ends
 FRAMED = {"Content-Security-Policy": "frame-ancestors 'none'"}
-ORDERS = {
-    "pause": Command.PAUSE,
-    "resume": Command.RESUME,
-    "cancel": Command.CANCEL,
-    "emergency": Command.EMERGENCY_STOP,
-}
+ORDERS = {"pause": Command.PAUSE, "resume": Command.RESUME, "cancel": Command.CANCEL, "emergency": Command.EMERGENCY_STOP}
 
 
 class Watched:
@@ -48,16 +43,14 @@ class Watched:
         self._asked, self._end_reported = Event(), Event()
 
     def follow(self, status: PrintStatus) -> None:
-        """Set the newest status."""
         self._status = status
 
     def state(self) -> bytes:
-        """The state as JSON."""
         self._asked.set()
         if self._ended:
             self._end_reported.set()
         status = replace(self._status, state=self._ended) if self._ended else self._status
-        return json.dumps(status.json() | {"told": _told(status)}).encode()
+        return json.dumps(status.json() | {"told": _in_words(status)}).encode()
 
     def end(self, state: PrintState) -> None:
         """Set the final state once, and wait briefly until a page that has polled before receives it."""
@@ -66,7 +59,7 @@ class Watched:
             self._end_reported.wait(LAST_WORD_S)
 
 
-def _told(status: PrintStatus) -> str:
+def _in_words(status: PrintStatus) -> str:
     """How the print is, in one line."""
     heat = status.temperature
     temperatures = [

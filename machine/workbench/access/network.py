@@ -133,7 +133,6 @@ class Lan:
         return own_hosts((*self.addresses, *self.names), port, self.scheme)
 
     def urls(self, port: int) -> tuple[str, ...]:
-        """URLs to open on a device."""
         return tuple(f"{self.scheme}://{address}:{port}/" for address in self.addresses)
 
 

@@ -297,11 +297,6 @@ def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:
     return replace(changed, rows=tuple(replace(row, time_s=None, filament_mm=None) for row in bench.rows), priced=False)
 
 
-def with_rows(bench: Bench, rows: Sequence[FrontRow]) -> Bench:
-    """Keep only these rows of the front; pricing them determines the recommended one."""
-    return replace(bench, rows=tuple(rows), recommended=bench.recommended if rows else 0)
-
-
 def rows_to_price(bench: Bench) -> list[int]:
     """Indices of the rows of the front whose time and filament are shown."""
     return [row for row, good in enumerate(pareto_optimal(bench.rows)) if good]

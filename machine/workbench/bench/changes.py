@@ -188,7 +188,6 @@ def limb(bench: Bench, *, part: int, point_mm: Point | None = None) -> Edit:
 
 
 def remove(bench: Bench, *, part: int) -> Edit:
-    """Remove the plane of a part."""
     return Edit("remove a plane", [(_replaced(bench, part), 0)])
 
 

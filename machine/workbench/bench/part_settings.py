@@ -57,13 +57,11 @@ def with_part_setting(profile: Profile, part: int, key: str, value: str | None) 
 
 
 def without_part_settings(profile: Profile, part: int) -> Profile:
-    """The profile without settings of this part."""
     others = [own for own in profile.parts if own.part != part]
     return profile.model_copy(update={"parts": others})
 
 
 def own_values(profile: Profile, part: int) -> dict[str, object]:
-    """Process keys and values of one part."""
     return next((dict(own.process) for own in profile.parts if own.part == part), {})
 
 

@@ -32,7 +32,6 @@ BOUNDS = (("minimum", "exclusiveMinimum"), ("maximum", "exclusiveMaximum"))
 
 
 def key_of(setting: str) -> str:
-    """The key of a setting KEY=VALUE."""
     return setting.partition("=")[0].strip()
 
 

@@ -72,7 +72,6 @@ class JobState:
 
     @property
     def state(self) -> PrintState:
-        """The state of its status."""
         return self.status.state
 
     def changed(self, state: PrintState | None = None, **values: Any) -> "JobState":

@@ -124,7 +124,6 @@ def go_on(
 
 
 def follow(page: PageOfPrints, *, port: str = "") -> None:
-    """Follow the running print of a print server."""
     page.prints.begin(page.name, PrintJob(parse_server_address(_destination(port).name), Does.FOLLOW))
 
 
@@ -143,7 +142,6 @@ def emergency(page: PageOfPrints, *, print: Any = None) -> None:
 
 
 def take(page: PageOfPrints, *, print: int) -> None:
-    """Take over control of a print."""
     page.prints.numbered(print).holder = page.name
 
 
@@ -156,27 +154,15 @@ def forget(page: PageOfPrints, *, print: int) -> None:
 
 
 FUNCTIONS: dict[str, Callable[..., Work | None]] = {
-    "ports": ports,
-    "journals": journals,
-    "check": check,
-    "go_on": go_on,
-    "follow": follow,
-    "hand": hand,
-    "emergency": emergency,
-    "take": take,
-    "forget": forget,
+    function.__name__: function for function in (ports, journals, check, go_on, follow, hand, emergency, take, forget)
 }
 # Commands for one print, which only the page that controls it may give.
 OF_PRINT: dict[str, Callable[..., None]] = {
-    "begin": RunningPrint.begin,
-    "cancel": RunningPrint.cancel,
-    "leave": RunningPrint.leave,
-    "pause": RunningPrint.pause,
-    "resume": RunningPrint.resume,
-    "feed": RunningPrint.feed,
-    "flow": RunningPrint.flow,
-    "babystep": RunningPrint.babystep,
-    "by_hand": RunningPrint.by_hand,
+    function.__name__: function
+    for function in (
+        *(RunningPrint.begin, RunningPrint.cancel, RunningPrint.leave, RunningPrint.pause, RunningPrint.resume),
+        *(RunningPrint.feed, RunningPrint.flow, RunningPrint.babystep, RunningPrint.by_hand),
+    )
 }
 COMMANDS = {name: arguments_of(function) for name, function in FUNCTIONS.items()} | {
     name: arguments_of(function, OfPrint) for name, function in OF_PRINT.items()

@@ -7,7 +7,7 @@ every page: in an emergency no one should have to find another window.
 import asyncio
 import json
 from collections import Counter
-from collections.abc import Coroutine, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import asdict
 from os.path import realpath
@@ -48,7 +48,6 @@ class Prints(Observable):
         self._history = past_prints()
         self._reads_journals = False
         self._over: Flag | None = None  # cancels the running query of ports
-        self._tasks: set[asyncio.Task[None]] = set()
 
     @property
     def running(self) -> list[RunningPrint]:
@@ -76,7 +75,13 @@ class Prints(Observable):
             "journals": self._journals_state(),
             "history": [past_row(past) for past in self._history],
             "prints": [
-                {**job.state.json(), "number": job.number, "holder": job.holder, "held": bool(self._pages[job.holder])}
+                {
+                    **job.state.json(),
+                    "webcam": bool(job.state.webcam),  # the page gets its picture from this server
+                    "number": job.number,
+                    "holder": job.holder,
+                    "held": bool(self._pages[job.holder]),
+                }
                 for job in self.prints
             ],
         }
@@ -119,7 +124,7 @@ class Prints(Observable):
         self._last += 1
         begun = RunningPrint(self._last, job, page, self.notify)
         self.prints.append(begun)
-        self._start(self._print(begun))
+        self.launch(self._print(begun))
         self.notify()
 
     def _forget_old(self, at: Destination) -> None:
@@ -166,7 +171,7 @@ class Prints(Observable):
         """Read which prints can be resumed."""
         if not self._reads_journals:
             self._reads_journals = True
-            self._start(self._read_journals())
+            self.launch(self._read_journals())
 
     async def _read_journals(self) -> None:
         try:
@@ -180,7 +185,7 @@ class Prints(Observable):
         check_baud(baud)
         if self._over is None:
             self._over = Flag()
-            self._start(self._ask_ports(baud, self._over))
+            self.launch(self._ask_ports(baud, self._over))
 
     async def _ask_ports(self, baud: int, over: Flag) -> None:
         try:
@@ -191,11 +196,6 @@ class Prints(Observable):
         finally:
             self._over = None
             self.notify()
-
-    def _start(self, work: Coroutine[Any, Any, None]) -> None:
-        task = asyncio.create_task(work)
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
 
 
 def _same(a: Destination, b: Destination) -> bool:

@@ -88,7 +88,6 @@ def _print_rest(job: PrintJob, person: AtPage) -> End:
 
 
 def _follow(job: PrintJob, person: AtPage) -> End:
-    """Follow the running print of a server."""
     assert isinstance(job.destination, Server)
     with open_server_printer(job, job.destination, person) as printer:
         printer.greet()

@@ -45,7 +45,6 @@ class RunningPrint:
 
     @property
     def over(self) -> bool:
-        """Whether it has ended."""
         return self.state.state.is_over
 
     @property

@@ -40,9 +40,16 @@ class Observable:
         self.version, self.closed = 0, False
         self.listeners: list[Callable[[], None]] = []
         self._changed = asyncio.Event()
+        self._tasks: set[asyncio.Task[None]] = set()
+
+    def launch(self, work: Coroutine[Any, Any, None]) -> "asyncio.Task[None]":
+        """Start work in the background."""
+        task = asyncio.create_task(work)
+        self._tasks.add(task)
+        task.add_done_callback(self._tasks.discard)
+        return task
 
     def notify(self) -> None:
-        """Notify the pages of a change."""
         self.version += 1
         self._changed.set()
         self._changed = asyncio.Event()
@@ -71,7 +78,7 @@ class SessionBase(Observable):
 
     problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
     gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; note: what the last
-    command has changed beside what it was for; quick, long, hand: its tasks in the pools; aside: tasks for which nobody waits;
+    command has changed beside what it was for; quick, long, hand: its tasks in the pools; aside: tasks that no one waits for;
     received: the files of its pages; others: file of the parts of the other models on the plate (see work.plate); others_version:
     how often a task has added some; followers: called after every change of the bench.
     """
@@ -91,7 +98,6 @@ class SessionBase(Observable):
         self.others, self.others_version = self.new_file(), 0
         self._others_profile = bench.profile
         self.followers.append(self._drop_others)
-        self._tasks: set[asyncio.Task[None]] = set()
 
     @property
     def bench(self) -> Bench:
@@ -138,9 +144,7 @@ class SessionBase(Observable):
             finally:
                 self.answer(ask, refusal)
 
-        task = asyncio.create_task(attempt())
-        self._tasks.add(task)
-        task.add_done_callback(self._tasks.discard)
+        task = self.launch(attempt())
         task.add_done_callback(lambda _: work.close())  # if it was cancelled before it began
         return task
 
@@ -256,7 +260,6 @@ class Derived(Generic[Value]):
 
     @property
     def result(self) -> Value | None:
-        """The result for the current bench, or None."""
         return self.done if self._of is not None and self._of == self._key_of(self._session.bench) else None
 
     @property

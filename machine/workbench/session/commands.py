@@ -65,16 +65,6 @@ def search(session: Session, *, orient: bool = True, ranker: str = CLASSIC) -> N
     session.finding.search(orient, ranker.strip() or CLASSIC)
 
 
-def begin_slices(session: Session) -> None:
-    """Begin to slice what lies on the bench."""
-    session.slicing.slice()
-
-
-def compare(session: Session) -> None:
-    """Compare the slices with the same model in one piece."""
-    session.comparing.compare()
-
-
 def try_plane(session: Session, *, part: int, normal: Direction, offset_mm: Mm) -> None:
     """Try a plane while the user drags it."""
     session.trials.hold(move(session.bench, part=part, normal=normal, offset_mm=offset_mm).cuts)
@@ -110,8 +100,8 @@ ACTS: dict[str, Callable[..., Any]] = {
     "redo": redo,
     "dismiss": dismiss,
     "search": search,
-    "slice": begin_slices,
-    "compare": compare,
+    "slice": lambda session: session.slicing.slice(),
+    "compare": lambda session: session.comparing.compare(),
     "stop": Session.stop,
     "try": try_plane,
     "neck": take_neck,

@@ -1,5 +1,6 @@
 """Planes on a bench: preparation as soon as there is a model, trials while the user drags them, and their application."""
 
+from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from hashlib import sha256
@@ -22,10 +23,12 @@ from mdp.zone import Zones
 from profiles.effect import effect_of_change
 from profiles.errors import MeshError, PlanError
 from profiles.frozen import Effect
+from profiles.profile import Profile
 
 ALIKE_MM, ALIKE_DEG = 0.01, 0.05  # differences between planes that are not reported
 REST_S = 0.1  # pause in dragging after which the planes are tried more closely
 CHANGING_S = 0.2  # pause in changes of a bench after which it is prepared
+MOST_NUMBERED = 8  # benches whose numbers are known
 _numbers = count(1)  # of the benches of all sessions, which may share processes
 
 
@@ -34,9 +37,8 @@ class Readiness(Derived[None]):
     wait for the first plane."""
 
     def __init__(self, session: SessionBase) -> None:
-        self._number = 0
-        self._solid: tuple[object, ...] = (None, None, None)  # determines the cuts on the bench with that number
-        self._profile = session.bench.profile
+        # numbers of the newest benches, each with what determines its cuts, the newest last
+        self._numbered: deque[tuple[tuple[object, ...], Profile, int]] = deque(maxlen=MOST_NUMBERED)
         self._model = ""  # key of the model prepared last
         super().__init__(
             session,
@@ -46,7 +48,7 @@ class Readiness(Derived[None]):
 
     def load(self) -> None:
         """Load the kernels for planes while the first model is read."""
-        if not self._number:
+        if not self._numbered:
             self._session.start(self._session.hand.run(load_kernels))
 
     async def ask(self, task: Callable[..., Value], bench: Bench, *given: Any) -> Value:
@@ -54,14 +56,15 @@ class Readiness(Derived[None]):
         return await self._session.hand.run(task, self._number_of(bench), bench, *given)
 
     def _number_of(self, bench: Bench) -> int:
-        """The number of a bench; the last one's if its preparation is valid for this bench, because planes read the same part of
-        a profile as a search."""
-        solid, profile = (bench.model and bench.model.key, bench.rotation, bench.zones), bench.profile
-        is_another = any(new is not old for new, old in zip(solid, self._solid, strict=True))
-        if is_another or effect_of_change(self._profile, profile) >= Effect.REACH:
-            self._number = next(_numbers)
-        self._solid, self._profile = solid, profile
-        return self._number
+        """The number of a bench; that of an earlier one whose preparation is valid for this bench, too, because planes read the
+        same part of a profile as a search."""
+        solid = bench.model and bench.model.key, bench.rotation, bench.zones
+        for known, profile, number in self._numbered:
+            same = all(new is old for new, old in zip(solid, known, strict=True))
+            if same and effect_of_change(profile, bench.profile) < Effect.REACH:
+                return number
+        self._numbered.append((solid, bench.profile, next(_numbers)))
+        return self._numbered[-1][2]
 
     async def _prepare(self, bench: Bench) -> None:
         """Prepare a bench, unless it changes again at once."""

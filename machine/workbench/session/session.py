@@ -25,7 +25,6 @@ from machine.workbench.bench.bench import (
     with_prices,
     with_profile,
     with_rotation,
-    with_rows,
     with_scaled_model,
 )
 from machine.workbench.bench.model import Model
@@ -143,13 +142,11 @@ class Session(SessionBase):
         if self._opened is None or model is None:
             raise PlanError("no model has just been opened over another one, so none can be put beside that")
         check_first_plate(model)
-        await self._add(self._opened[0], model.path, model.name)
+        await self.add_model(model.path, model.name, self._opened[0])
 
-    async def add_model(self, path: Path, name: str) -> None:
-        """Put the model of a file on the plate, beside that on the bench. Raises UserError."""
-        await self._add(self.bench, path, name)
-
-    async def _add(self, bench: Bench, path: Path, name: str) -> None:
+    async def add_model(self, path: Path, name: str, bench: Bench | None = None) -> None:
+        """Put the model of a file on the plate, beside that on the bench, None: the present one. Raises UserError."""
+        bench = bench or self.bench
         with self.waiting(f"reading {name}"):
             model = await self._read(path, name, bench.profile)
         self.do(f"add {name} to the plate", with_beside(bench, (*bench.beside, (model, 1))))
@@ -358,7 +355,7 @@ class Session(SessionBase):
         effect = effect_of_change(before.profile, bench.profile)
         if effect == Effect.REACH and bench.rows:
             rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).rejected]
-            bench = with_rows(bench, rows)
+            bench = replace(bench, rows=tuple(rows), recommended=bench.recommended if rows else 0)
         if bench.cuts is None or effect < Effect.REACH:
             return bench, ""
         bench, removed = await self.trials.without_invalid(bench)

@@ -45,7 +45,7 @@ def prints_line(
         with prints.page(page):
             try:
                 hearing = _hear(socket, PageOfPrints(page, session, prints, benches))
-                await until_either_ends(tell(prints, lambda: _told(prints), socket), hearing)
+                await until_either_ends(tell(prints, prints.snapshot, socket), hearing)
             except ExceptionGroup as bugs:
                 log_bug(bugs.exceptions[0], ())
 
@@ -63,12 +63,6 @@ def print_log(prints: Prints) -> Callable[[Request], Awaitable[Response]]:
         return Response("there is no log of this print\n", 404)
 
     return answer
-
-
-def _told(prints: Prints) -> dict[str, Any]:
-    """State of the prints for every page."""
-    state = prints.snapshot()
-    return state | {"prints": [job | {"webcam": bool(job["webcam"])} for job in state["prints"]]}
 
 
 def print_webcam(prints: Prints) -> Callable[[Request], Awaitable[Response]]:

@@ -61,7 +61,6 @@ async def profile(session: Session, request: Request) -> Response:
 
 
 async def plan(session: Session, request: Request) -> Response:
-    """The plan file."""
     text = await session.make("cutting the parts", make_plan)
     return Response(text, headers=_saved_as(f"{file_stem(session.bench)}-plan.toml"), media_type="application/toml")
 
@@ -77,16 +76,17 @@ def _made_file(word: str, task: Callable[..., None], kind: str, ending: str) -> 
     return answer
 
 
-async def print_page(session: Session, request: Request) -> Response:
-    """The page of the last slices, or of a G-code file, as `view` writes it, with its own content security policy in it."""
-    sliced = _sliced(session, request)
-    return _gone() if sliced is None else FileResponse(sliced.page, media_type="text/html")
+def _sliced_file(file_of: Callable[[Sliced], Path], kind: str) -> Act:
+    """Handler that returns a file of the last slices, or of the open G-code file, whichever has the requested key."""
 
+    async def answer(session: Session, request: Request) -> Response:
+        slices = session.slicing.latest()
+        for sliced in (session.gcode, None if slices is None else slices.sliced):
+            if sliced is not None and sliced.key == request.path_params["key"]:
+                return FileResponse(file_of(sliced), media_type=kind)
+        return _gone()
 
-async def print_text(session: Session, request: Request) -> Response:
-    """The G-code of the last slices for display, whatever the dry run found."""
-    sliced = _sliced(session, request)
-    return _gone() if sliced is None else FileResponse(sliced.gcode, media_type="text/plain")
+    return answer
 
 
 async def print_walls(session: Session, request: Request) -> Response:
@@ -115,13 +115,6 @@ async def gcode(session: Session, request: Request) -> Response:
             " the same"
         )
     return FileResponse(sliced.gcode, headers=_saved_as(f"{file_stem(session.bench)}.gcode"), media_type="text/plain")
-
-
-def _sliced(session: Session, request: Request) -> Sliced | None:
-    """The last slices or the open G-code file, whichever has the requested key; None for neither."""
-    slices, key = session.slicing.latest(), request.path_params["key"]
-    there = [session.gcode, None if slices is None else slices.sliced]
-    return next((sliced for sliced in there if sliced is not None and sliced.key == key), None)
 
 
 def _gone() -> Response:
@@ -261,7 +254,7 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("model/{key}", _of_key(_model_key, _model)),
         route("marks/{key}", _of_key(lambda session: marks_key(session.bench), _marks)),
         route("pedestal/{key}", _of_key(lambda session: pedestal_key(session.bench, session.standing.result), _pedestal)),
-        route("others/{key}", _of_key(_others_key, _others)),
+        route("others/{key}", _of_key(lambda session: getattr(session.standing.result, "others_key", ""), _others)),
         route("facets/{key}", _of_key(_model_key, _facets)),
         route("file", uploads.take, "POST"),
         route("left", uploads.list_left),
@@ -277,8 +270,8 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("pieces", _pieces, need=Need.PARTS),
         route("parts.zip", _made_file("cutting the parts", make_folder, ZIP, "-parts.zip"), need=Need.PARTS),
         route("pictures.zip", _made_file("drawing the parts", make_pictures, ZIP, "-pictures.zip"), need=Need.PARTS),
-        route("print/{key}", print_page),
-        route("print/{key}/text", print_text),
+        route("print/{key}", _sliced_file(lambda sliced: sliced.page, "text/html")),  # has its own content security policy
+        route("print/{key}/text", _sliced_file(lambda sliced: sliced.gcode, "text/plain")),  # whatever the dry run found
         route("walls/{number:int}/{part:int}", print_walls),
         route("print.html", shared_page),
         route("print.gcode", gcode),
@@ -348,11 +341,6 @@ async def _model(session: Session, request: Request) -> Response:
 async def _pedestal(session: Session, request: Request) -> Response:
     assert session.standing.result is not None
     return Response(session.standing.result.pedestal, media_type=BYTES)
-
-
-def _others_key(session: Session) -> str:
-    standing = session.standing.result
-    return "" if standing is None else standing.others_key
 
 
 async def _others(session: Session, request: Request) -> Response:

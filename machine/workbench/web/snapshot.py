@@ -186,7 +186,7 @@ def snapshot(session: Session) -> dict[str, Any]:
 
 
 def _steps(history: History) -> dict[str, Any]:
-    """What can be undone and redone."""
+    """The steps that can be undone and redone."""
     undo, redo = (_words(steps) for steps in ((*history.before, history.now)[1:], history.undone))
     return {"undo": undo[0] if undo else "", "redo": redo[0] if redo else "", "steps": {"undo": undo, "redo": redo}}
 
@@ -290,7 +290,6 @@ def _words(steps: Sequence[Step]) -> list[str]:
 
 
 def _stop(stop: Stop) -> dict[str, str]:
-    """A pause in words."""
     where = f"at {stop.height_mm or 0.0:.12g} mm" if stop.layer is None else f"before layer {stop.layer}"
     return {"kind": "filament change" if stop.change else "pause", "where": f"part {stop.part}, {where}"}
 

@@ -87,7 +87,6 @@ class Uploads:
         return await self._open(session, path.name, copy_to)
 
     async def remove_left(self, session: Session, request: Request) -> Response:
-        """Remove a file left behind."""
         await asyncio.to_thread(remove_file, self._left_file(request))
         return JSONResponse({})
 
@@ -122,7 +121,6 @@ class Uploads:
         return Response("there is no picture of this work\n", 404)
 
     async def open_kept(self, session: Session, request: Request) -> Response:
-        """Open autosaved work on a bench."""
         folder = _kept_folder(request)
         project = read_folder(folder)
         word = f"open the work of {strftime('%H:%M', localtime(project.written_s))}"
@@ -134,7 +132,6 @@ class Uploads:
         return JSONResponse({})
 
     async def remove_kept(self, session: Session, request: Request) -> Response:
-        """Remove a folder of kept work."""
         folder = _kept_folder(request)
         lock = None
         with suppress(FileNotFoundError):

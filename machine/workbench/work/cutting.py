@@ -17,15 +17,7 @@ import numpy as np
 from machine.pipeline import compilers
 from machine.pipeline.choice import lies_freely, orientation_in_words, pricing, standing_in_words
 from machine.pipeline.given_plan import with_file_marks
-from machine.pipeline.pictures import (
-    PLAIN,
-    contact_sheet,
-    front_picture,
-    parts_picture,
-    parts_together,
-    png_bytes,
-    small_picture,
-)
+from machine.pipeline.pictures import PLAIN, contact_sheet, front_picture, parts_picture, parts_together, png_bytes, small_picture
 from machine.pipeline.project import PICTURE_PX, STANDING, project_bytes, read_folder, with_meshes_beside
 from machine.planning.fit import check_parts
 from machine.planning.stops import check_stop_parts
@@ -40,7 +32,7 @@ from machine.workbench.work.folders import work_of
 from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition, FrontRow, Part
 from mdp.directions.orientation import set_on_plate
-from mdp.joint import is_sound, joints_of
+from mdp.joint import flaw_of, joints_of
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import locate
@@ -135,13 +127,14 @@ def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ..
 
 
 def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
-    """A row of the front with its time and filament; without them if it cannot be cut, or is not sound."""
+    """A row of the front with its time and filament; without them if it cannot be cut, or has a flaw."""
     row = bench.rows[number]
     with suppress(PlanError):
         parts = planned_parts(row)
         cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts, front=()), prices=True)
         by_hand = sum(1 for _ in takewhile(bench.locked.__contains__, reversed(parts)))
-        return cut.front[0] if is_sound(cut.mesh, cut.parts, bench.profile, by_hand) else replace(row, sound=False)
+        flaw = flaw_of(cut.mesh, cut.parts, bench.profile, by_hand)
+        return replace(row, flaw=flaw) if flaw else cut.front[0]
     return row
 
 
@@ -157,7 +150,6 @@ def make_plan(tell: Tell, bench: Bench) -> str:
 
 
 def make_project(tell: Tell, bench: Bench, out: Path) -> None:
-    """Write the project file of the bench."""
     decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
     check_stop_parts(bench.stops, len(decomposition.parts))
     compilers.wait_for(compilers.PICTURES)
@@ -281,7 +273,6 @@ def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
 
 
 def make_ready(tell: Tell, number: int, bench: Bench) -> None:
-    """Prepare the bench with this number for planes."""
     _trials(number, bench)
 
 

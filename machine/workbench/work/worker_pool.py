@@ -63,7 +63,6 @@ class WorkerPool:
 
     @property
     def may_start(self) -> bool:
-        """Whether another process may be started."""
         return len(self._busy) + sum(worker.ready for worker in self._idle) < self.most
 
     @asynccontextmanager

@@ -78,7 +78,7 @@ WRONG = [
     (["export", "demo:tree", "-o", "x.gcode", "--part", "2:walls=-4"], "part 2: process.walls is -4: it must be a whole number"),
     (["export", "demo:tree", "-o", "x.gcode", "--copies", "0"], "--copies is 0: 1 to 1000 is allowed"),
     *(
-        (["export", f"demo:tree:{count}", "-o", "x.gcode"], "demo:tree: must be a whole number from 1 to 1000")
+        (["export", f"demo:tree:{count}", "-o", "x.gcode"], "demo:tree must be a whole number from 1 to 1000")
         for count in ("0", "-1", "2.5", "1001", "")
     ),
     (
@@ -351,7 +351,7 @@ def test_a_plan_that_lays_the_model_down_does_not_go_with_keeping_it(folder: Pat
     assert main(["decompose", "tee.stl", "--plan", "tee.toml", "--json", "out.json"]) == 0
     assert json.loads(Path("out.json").read_text())["rotate_deg"] == [90.0, 0.0, 0.0]
     assert main(["decompose", "tee.stl", "--plan", "tee.toml", "--as-is"]) == 1
-    assert "--as-is: the plan tee.toml lays the model down by its orientation" in capsys.readouterr().err
+    assert "--as-is: the plan tee.toml gives the model's orientation" in capsys.readouterr().err
 
 
 STAYS = [
@@ -515,3 +515,28 @@ def test_a_closed_standard_output_is_no_bug() -> None:
     command = f"{sys.executable} -m machine.cli.cli profiles list >&-"
     ended = subprocess.run(["sh", "-c", command], capture_output=True, text=True, check=False)
     assert (ended.returncode, ended.stderr) == (0, "")
+
+
+def test_the_entry_point_runs_as_a_module() -> None:
+    command = [sys.executable, "-m", "machine.cli.start", "--version"]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout.startswith("tiltprint ")
+
+
+def test_a_saved_profile_is_overwritten_only_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    own = tmp_path / "own.toml"
+    save = ["profiles", "save", "pla", "-o", str(own), "--set"]
+    assert main([*save, "material.nozzle_c=200"]) == 0
+    assert main([*save, "material.nozzle_c=205"]) == 1
+    assert "own.toml exists: --replace writes over it, another name leaves it" in capsys.readouterr().err
+    assert "200" in own.read_text()
+    assert main([*save, "material.nozzle_c=205", "--replace"]) == 0
+    assert ("205" in own.read_text(), "200" in own.with_suffix(".toml.before").read_text()) == (True, True)
+
+
+def test_an_export_in_one_part_searches_no_parts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("machine.notices.PLAIN_EVERY_S", 0.0)
+    out = str(tmp_path / "out.gcode")
+    assert main(["export", "demo:bracket", *FAST, "--parts", "1", "--set", "process.scale=0.3", "-o", out]) == 0
+    assert "searching parts" not in capsys.readouterr().err

@@ -1,12 +1,13 @@
 """Blocks of a machine: written for its firmware, or refused with what a person should do."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 from machine.cli.cli import main
 from machine.firmware import dialects
-from machine.gcode.blocks import block_problems, refused_lines
+from machine.gcode.blocks import block_problems, filled_start, refused_lines
 from machine.gcode.writer import write_gcode
 from profiles.errors import ProfileError
 from profiles.profile import load, shipped
@@ -73,3 +74,13 @@ def test_an_own_machine_that_inherits_another_firmware_s_blocks_is_refused_befor
 )
 def test_a_line_is_refused_where_its_firmware_refuses_it(dialect: str, line: str, is_refused: bool) -> None:
     assert list(refused_lines([line, ";a comment", ""], dialects()[dialect])) == ([line] if is_refused else [])
+
+
+def test_a_table_levelled_by_hand_is_held_by_its_motors_from_the_start() -> None:
+    """Marlin (planner.cpp) and RepRapFirmware switch a motor on by its first move, not by G92: the first part has no turn."""
+    starts = {name: filled_start(load(machine=name)) for name in shipped("machine")}
+    levelled = {name: lines for name, lines in starts.items() if any(re.match(r"G92 [ABCUV]0", line) for line in lines)}
+    assert sorted(levelled) == ["gen5x", "generic_ac", "open5x_prusa_i3", "open5x_voron0"]
+    for name, lines in levelled.items():
+        homing = next(number for number, line in enumerate(lines) if line.startswith("G28"))
+        assert lines[:homing].count("M17") == 1, name

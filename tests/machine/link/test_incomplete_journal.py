@@ -18,7 +18,7 @@ from profiles.errors import JournalError, OutputError
 from tests.machine.link.failing_disk import FailingDisk, full_disk, keep_notes_in, small_disk
 
 HEADING = JournalHeading("/prints/a.gcode", "00" * 32, "a", {"machine": {"name": "m"}})
-INCOMPLETE = "is incomplete: its print went on when the journal could not be written any more"
+INCOMPLETE = "is incomplete: its print continued after the journal could no longer be written"
 ERRORS = [errno.ENOSPC, errno.EIO, errno.EDQUOT, errno.EROFS, errno.EFBIG, FailingDisk.SHORT]
 
 

@@ -116,11 +116,11 @@ def test_a_journal_never_grows(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("content", "words"), [
     (b"", "is empty"),
-    (b"G28\nG1 X5\n", "is no journal of a print"),
+    (b"G28\nG1 X5\n", "is not the journal of a print"),
     (b"%08x {}\n" % crc32(b"{}"), "another version"),
     (b'%08x {"format":2}\n' % crc32(b'{"format":2}'), "another version of this program: this one reads format 3"),
-    (b'%08x {"format":3}\n' % crc32(b'{"format":3}'), "does not tell program and profile"),
-    (os.urandom(5000), "is no journal"),
+    (b'%08x {"format":3}\n' % crc32(b'{"format":3}'), "lacks the program or the profile"),
+    (os.urandom(5000), "is not the journal"),
 ])  # fmt: skip
 def test_what_is_no_journal_is_refused_with_a_sentence(tmp_path: Path, content: bytes, words: str) -> None:
     (tmp_path / "j").write_bytes(content)
@@ -198,6 +198,12 @@ def test_a_state_has_the_word_in_the_file_that_it_always_had(state: PrintState, 
         journal.write(at(20, state))
     assert f'12.34567],"{word}"]'.encode() in journal.path.read_bytes()
     assert read_journal(journal.path).last == at(20, state)
+
+
+def test_a_record_without_a_z_offset_reads_as_one_of_0_mm(tmp_path: Path) -> None:
+    offsets = [at(4), replace(at(5), z_offset_mm=-0.05)]
+    assert [read_journal(written(tmp_path / f"{k}", [moment])).last for k, moment in enumerate(offsets)] == offsets
+    assert b'"printing"]' in (tmp_path / "0").read_bytes()  # the record of earlier versions
 
 
 def test_a_record_with_a_state_that_no_print_has_is_damage(tmp_path: Path) -> None:

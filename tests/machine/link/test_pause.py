@@ -318,7 +318,7 @@ def test_a_line_that_was_torn_with_the_port_is_never_done_twice_or_left_out(dial
         error = str(stopped)
     done, program = strokes(watcher.printer), planned(PROGRAM)
     assert np.abs(done - program[: len(done)]).max() < 1e-6
-    assert len(done) == len(program) or "whether it was done is not known" in error or "can no longer be trusted" in error
+    assert len(done) == len(program) or "whether it was executed is unknown" in error or "can no longer be trusted" in error
 
 
 @pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])

@@ -17,7 +17,7 @@ from machine.gcode.modes import ModalState, axes_of
 from machine.link import status
 from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
 from machine.link.medium import SERIAL, Medium, Wire
-from machine.link.pending_commands import Control
+from machine.link.pending_commands import Command, Control
 from machine.link.port import open_port
 from machine.link.print_state import PrintState, PrintStatus
 from machine.link.protocol.framing import frame
@@ -26,10 +26,11 @@ from machine.link.status import PrinterStatus
 from machine.link.stream import print_lines
 from machine.printing.journal_folder import continue_journal
 from machine.printing.serial_log import tap
+from machine.simulator import commands
 from machine.simulator.board import BuildOptions
 from machine.simulator.faults import Fault, FaultScript
 from machine.simulator.simulator import SimulatedPrinter
-from profiles.errors import FirmwareError, JournalError, SilenceError
+from profiles.errors import FirmwareError, JournalError, PrinterError, SilenceError
 from profiles.profile import Profile, load
 from tests.machine.peers import happened, on_terminal
 from tests.machine.virtual_printer import PATH, VirtualPrinter
@@ -216,6 +217,73 @@ def test_a_second_death_is_resumed_from_the_second_journal(text: GcodeFile, whol
     assert np.array_equal(moved(printer), whole)
 
 
+def shifted_then_killed(text: GcodeFile, printer: VirtualPrinter) -> JournalContents:
+    """Print with feed at 150 % and the tip raised by 0.1 mm from line 50 until the host dies."""
+    control, asked_for = Control(), [(Command.FEED, 150.0), (Command.BABYSTEP, 0.1)]
+
+    def watch(status: PrintStatus) -> None:
+        while asked_for and status.file_line >= 50:
+            control.ask(*asked_for.pop())
+
+    medium = replace(printer.medium, open=lambda name, baud: _Mortal(printer.medium.open(name, baud), 233))
+    with journal_of(text, "first") as journal, pytest.raises(KilledError):
+        print_lines(text, PATH, medium=medium, profile=PROFILE, journal=journal, control=control, on_progress=watch)
+    return read_journal(journal.path)
+
+
+def heights_of_strokes(printer: VirtualPrinter) -> set[float]:
+    """Where the axis Z really was in the strokes of the third part."""
+    record = printer.record
+    rows = (record.end[:, 5] - record.start[:, 5] > 1e-9) & (record.end[:, 3] == -20.0)
+    return set(np.round(record.end[rows & (record.end[:, 0] != record.start[:, 0]), 2], 3).tolist())
+
+
+def test_a_print_whose_host_has_died_keeps_its_z_offset_and_takes_it_back(text: GcodeFile) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = shifted_then_killed(text, printer)
+    way, sent = resumed(text, printer, story)
+    assert (story.last.z_offset_mm, way.z_offset_mm) == (0.1, 0.1)
+    assert "it must still have the Z offset of +0.1 mm" in way.reason
+    assert heights_of_strokes(printer) == {63.1, 63.3}
+    assert [line for line in sent if line.startswith(("M290", "M22"))] == ["M220 S100", "M221 S100", "M290 Z-0.100"]
+
+
+def test_after_a_power_cut_the_z_offset_is_set_again_once_the_tip_has_risen(text: GcodeFile) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = shifted_then_killed(text, printer)
+    stands_mm = printer.record.end[-1, 2]
+    printer.firmware.reset()
+    way, sent = resumed(text, printer, story)
+    set_mm = next(float(match[1]) for line in way.before if (match := re.match(r"G92 X.* Z(\S+)", line)))
+    assert set_mm == pytest.approx(stands_mm, abs=0.005)
+    across = next(number for number, line in enumerate(way.before) if line.startswith("G0 X"))
+    assert way.before.index("G28 X Y") < way.before.index("M290 Z0.100") < across
+    assert heights_of_strokes(printer) == {63.1, 63.3}
+    assert sent.count("M290 Z-0.100") == 1
+
+
+def test_a_print_that_begins_anew_says_that_its_z_offset_is_lost() -> None:
+    way = plan_resume(replace(point(12), checkpoint=Checkpoint(12, 12, 12, 100, z_offset_mm=-0.05)), asked(), PROFILE)
+    assert (way.line, way.z_offset_mm) == (1, 0.0)
+    assert way.reason.endswith("set its Z offset of -0.05 mm again")
+
+
+def test_a_firmware_that_cannot_set_the_z_offset_of_an_interrupted_print_is_refused_before_anything_moves(
+    text: GcodeFile, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = shifted_then_killed(text, printer)
+    printer.firmware.reset()
+    moves = len(printer.record.end)
+    monkeypatch.setattr(commands, "THERE", ())
+    with pytest.raises(PrinterError, match=r"a Z offset of \+0.1 mm, which this firmware cannot set: nothing was moved"):
+        print_lines(
+            text, PATH, medium=printer.medium, profile=PROFILE,
+            begin=lambda seen: plan_resume(cut_off(text, story.last), seen, PROFILE),
+        )  # fmt: skip
+    assert len(printer.record.end) == moves
+
+
 @pytest.mark.parametrize("advanced", [True, False])
 def test_a_power_cut_at_any_line_never_resumes_beyond_what_was_executed(text: GcodeFile, advanced: bool) -> None:
     for line in range(20, len(PROGRAM), 47):
@@ -296,7 +364,7 @@ def test_a_height_in_doubt_is_not_guessed(text: GcodeFile, tmp_path: Path, capsy
         assert main(["resume", str(journal), "--port", printer.path, "--yes"]) == 1
     errors = capsys.readouterr().err
     assert "it stands at Z 62.00 or Z 62.20; look at the print below it, for Z is not homed" in errors
-    assert "a person must see at which height the tip stands (1: Z 62.00, 2: Z 62.20)" in errors
+    assert "you must see at which height the tip stands (1: Z 62.00, 2: Z 62.20)" in errors
 
 
 @pytest.mark.parametrize(("said", "called"), [("2", "Z62.2 "), ("n", "")])
@@ -409,9 +477,9 @@ MOVED = {"X": 50.0, "Y": 50.0, "Z": 50.0}
     (point(TURN, TURN + 5), asked(), PROFILE, r"the table was turning about A.*machine\.gcode\.resume"),
     (cut_off(PROGRAM, ON_THE_WAY), asked(), PROFILE, "was on its way between print and parking place"),
     (cut_off(PROGRAM, replace(ON_THE_WAY, state="resuming")), asked(), PROFILE, "was on its way between print and parking place"),
-    (point(LINE), asked(MOVED), PROFILE, "stands at X50 Y50 Z50: it was homed or moved since; switch it off and on"),
+    (point(LINE), asked(MOVED), PROFILE, "reports the position X50 Y50 Z50: it was homed or moved since; switch it off and on"),
     (point(LINE), asked(AT_HOME, last=7), PROFILE, "another program has sent it 7 lines since: it may have been homed"),
-    (cut_off(NOWHERE, Checkpoint(14, 14, 13, 5)), asked(), PROFILE, "does not tell where X Y Z stand"),
+    (cut_off(NOWHERE, Checkpoint(14, 14, 13, 5)), asked(), PROFILE, "where X Y Z stand is unknown"),
     (point(LINE), asked(), FOLLOWING, "follows the table by itself"),
 ])  # fmt: skip
 def test_where_going_on_would_be_a_guess_it_is_refused(
@@ -547,7 +615,7 @@ def test_the_command_resumes_a_cancelled_print_and_refuses_to_do_it_twice(
     assert re.search(r"p, part [23] of 3, (layer 1, )?line \d+ of 310", errors)
     assert "has not restarted and knows its place" in errors
     assert "watch the print at http://" in errors
-    assert "was resumed already, what became of it is in" in errors
+    assert "was resumed already, its rest is in" in errors
     assert record.end[-1, 3:5].tolist() == [-20.0, 360.0]
 
 
@@ -635,7 +703,7 @@ def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that
     assert main(["resume", str(journal.path), "--port", "sim"]) == 1
     errors = capsys.readouterr().err
     assert "--machine gives another machine" in errors
-    assert "give --yes where there is no terminal" in errors
+    assert "give --yes if there is no terminal" in errors
     assert "ran to its end" in errors
     assert "a simulated printer ends with its print" in errors
 

@@ -149,5 +149,5 @@ def test_a_printer_that_waits_for_a_person_says_so_until_it_goes_on() -> None:
         medium=printer.medium,
         on_progress=lambda progress: shown.append(progress.message),
     )
-    assert list(dict.fromkeys(shown)) == ["", "the printer waits for a person: look at its display"]
+    assert list(dict.fromkeys(shown)) == ["", "the printer waits for you: look at its display"]
     assert shown[-1] == ""

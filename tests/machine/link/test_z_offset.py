@@ -1,5 +1,7 @@
 """Babystepping: Z is shifted in the midst of a print, along the tool whatever the table's pose, and taken back at the end."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,8 @@ from machine.firmware import dialect_of
 from machine.gcode.modes import axes_of
 from machine.link.pending_commands import Command, PendingCommand, PendingCommands
 from machine.link.print_state import PrintState
+from machine.simulator.faults import Fault
+from profiles.errors import PrinterError
 from profiles.profile import Profile, load
 from tests.machine.link.test_pause import PROGRAM, Watcher, strokes, watched
 
@@ -82,7 +86,7 @@ def test_a_z_offset_requested_while_a_print_finishes_is_neither_sent_nor_taken_b
 def test_a_z_offset_that_was_taken_back_or_never_sent_is_not_reported_as_kept() -> None:
     pending = PendingCommands(axes_of(load(machine="fractal5pro").machine), babystep="SET_GCODE_OFFSET Z_ADJUST={} MOVE=1")
     pending.accept(PendingCommand(Command.BABYSTEP, -0.05), PrintState.PRINTING, 0.0)
-    assert pending.kept_offset == ""
+    assert pending.kept == ""
     assert pending.undo_overrides() == []
 
 
@@ -94,4 +98,39 @@ def test_a_cancelled_print_tells_of_a_z_offset_that_the_printer_keeps(machine: s
     profile = load(machine=machine)
     watcher = watched({100: (Command.BABYSTEP, -0.05), 200: Command.CANCEL}, profile=profile)
     outcome = watcher.run(letters(profile))
-    assert (outcome.cancelled, outcome.kept_offset) == (True, sentence)
+    assert (outcome.cancelled, outcome.kept) == (True, sentence)
+
+
+@pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
+def test_a_cancelled_print_sets_feed_and_flow_back(machine: str) -> None:
+    profile = load(machine=machine)
+    watcher = watched({100: (Command.FEED, 150.0), 110: (Command.FLOW, 90.0), 200: Command.CANCEL}, profile=profile)
+    outcome = watcher.run(letters(profile))
+    assert (outcome.cancelled, outcome.kept) == (True, "")
+    assert {"M220 S150", "M221 S90"} <= set(watcher.lines())
+    assert watcher.lines()[-3:] == ["M220 S100", "M221 S100", "M105"]
+
+
+def test_a_failed_print_tells_what_the_printer_keeps() -> None:
+    profile = load(machine="fractal5pro")
+    cut = Fault("disconnect", at=250, unit="line")
+    watcher = watched({50: (Command.BABYSTEP, -0.05), 60: (Command.FEED, 150.0)}, cut, profile=profile)
+    kept = "the printer keeps the feed of 150 % and the Z offset of -0.05 mm: before another print send it M220 S100 and "
+    with pytest.raises(PrinterError, match=re.escape(f"{kept}SET_GCODE_OFFSET Z_ADJUST=0.050")):
+        watcher.run(letters(profile))
+
+
+def test_a_print_that_the_caller_ends_by_an_error_tells_what_the_printer_keeps() -> None:
+    def interrupt() -> None:
+        raise KeyboardInterrupt
+
+    profile = load(machine="fractal5pro")
+    watcher = watched({100: (Command.BABYSTEP, -0.05), 200: interrupt}, profile=profile)
+    with pytest.raises(KeyboardInterrupt, match=r"the printer keeps the Z offset of -0\.05 mm"):
+        watcher.run(letters(profile))
+
+
+def test_an_override_that_the_user_types_as_a_line_is_set_back() -> None:
+    watcher = watched({100: (Command.LINE, 100.0, "M220 S150"), 200: Command.CANCEL})
+    assert watcher.run(PROGRAM).cancelled
+    assert watcher.lines()[-2:] == ["M220 S100", "M105"]

@@ -20,9 +20,17 @@ def test_a_bundle_that_was_waited_for_is_not_compiled_again(unmarked, capsys):
     compilers = Compilers()
     compilers.wait_for(["dry-run"])
     assert (unmarked / "dry-run").exists()
-    assert "compiling the kernels (only the first run that needs them does)" in capsys.readouterr().err
+    assert "compiling the kernels, once, for the first run that needs them" in capsys.readouterr().err
     Compilers().wait_for(["dry-run"])
     assert capsys.readouterr().err == ""
+
+
+def test_a_log_names_the_compilation_once(unmarked, monkeypatch, capsys):
+    monkeypatch.setattr("machine.notices.PLAIN_EVERY_S", 0.0)
+    compilers = Compilers()
+    for bundle in ("dry-run", "draw"):
+        compilers.wait_for([bundle])
+    assert capsys.readouterr().err.count("compiling the kernels") == 1
 
 
 def test_where_no_process_can_be_had_the_work_goes_on(unmarked, monkeypatch):

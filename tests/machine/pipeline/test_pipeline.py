@@ -81,7 +81,7 @@ def test_pins_are_filled_without_a_finding_and_the_part_too_slender_for_one_is_n
     program = _arms("process.interlock=pins")
     assert {finding.code for finding in program.run.findings} <= {"uncalibrated"}
     assert [part.pins > 0 for part in program.sliced] == [False, False, True]
-    assert "no pins under part 2: one wants a place 4.6 mm wide" in capsys.readouterr().err
+    assert "no pins under part 2: a pin needs an area 4.6 mm wide" in capsys.readouterr().err
 
 
 def test_a_vase_that_ends_below_a_tip_says_so(capsys: pytest.CaptureFixture[str]) -> None:

@@ -286,7 +286,7 @@ def test_models_that_the_head_cannot_pass_are_refused_with_what_goes() -> None:
     models = [decomposed(whole(box(60, 60, height)), name=f"{height} high") for height in (70, 75, 80)]
     with pytest.raises(PlanError) as refused:
         on_one_plate(models, plate("process.complete_objects=true"))
-    assert "at which the head passes what stands while it prints" in str(refused.value)
+    assert "that the head reaches without hitting them" in str(refused.value)
     assert str(refused.value).endswith("process.complete_objects = false prints them layer by layer")
 
 

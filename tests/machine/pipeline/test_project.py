@@ -12,14 +12,16 @@ import trimesh
 from manifold3d import Manifold
 
 from machine.cli.cli import main
-from machine.pipeline.project import INSIDE, STANDING, Project, close_projects, is_project, open_project, project_bytes
+from machine.cli.commands.export import save
+from machine.pipeline.project import INSIDE, STANDING, Project, close_projects, is_project, open_project, project_bytes, unpack
 from machine.pipeline.project_record import RECORD
-from machine.pipeline.requests import Given
+from machine.pipeline.requests import Given, ModelRequest
 from mdp.cut import mesh_of
 from mdp.read import read_mesh
 from mdp.save import MODEL_PART, stl
 from mdp.search.plan_file import PlanFile
-from tests.shapes import tee
+from profiles.profile import load
+from tests.shapes import box, tee
 
 FAST = ("--set", "search.directions=20", "--set", "process.layer_height_mm=0.4", "--set", "machine.thumbnails_px=[]")
 FAST += ("--set", "process.infill_density=0.05", "--set", "process.first_layer_height_mm=0.4")
@@ -78,6 +80,16 @@ def project(folder: Path, saved: bytes) -> Path:
     """It lies beside the other files of the folder."""
     Path("tee.3mf").write_bytes(saved)
     return folder
+
+
+def test_a_project_of_several_models_has_the_copies_of_each(folder: Path) -> None:
+    (folder / "box.stl").write_bytes(stl(box(8.0, 8.0, 2.0)))
+    names: tuple[None, ...] = (None, None, None)
+    plate = ModelRequest("tee.stl", load(), profile_names=names, parts=1, orient=False, copies=2, beside=3 * ("box.stl",))
+    assert save(plate, folder / "plate.3mf") == 0
+    (folder / "open").mkdir()
+    project = unpack(folder / "plate.3mf", folder / "open")
+    assert (project.copies, [(name, count) for name, _, count in project.beside]) == (2, [("box.stl", 6)])
 
 
 @pytest.mark.parametrize(

@@ -143,6 +143,12 @@ def test_a_machine_too_low_for_every_stand_says_how_high_it_would_need_to_be() -
         route(_turn_of(low, None), 2, hull(PRINT, 0.0), low, SPEEDS)
 
 
+def test_a_place_that_is_high_enough_but_cannot_be_reached_is_not_called_too_low(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.planning.stand._ways_clear", lambda *_: False)
+    with pytest.raises(MoveError, match=r"A60\.000 C50\.000 needs a place for the head that it cannot reach"):
+        route(_turn_of(load().machine, None), 2, hull(PRINT, 0.0), load().machine, SPEEDS)
+
+
 @given(st.integers(0, 10**6), st.sampled_from((1, 3)), st.floats(-80.0, 80.0), st.floats(-80.0, 80.0))
 @settings(max_examples=30)
 def test_the_least_height_is_that_of_all_directions_bodies_and_turns(seed: int, every: int, x: float, y: float) -> None:

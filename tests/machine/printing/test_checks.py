@@ -31,7 +31,7 @@ from machine.printing.checks import (
     machine_sentences,
     program_sentences,
 )
-from machine.printing.destination import SerialPort
+from machine.printing.destination import SerialPort, parse_destination
 from machine.printing.servers.server import Identity
 from machine.program import Program
 from machine.simulator.simulator import SimulatedPrinter
@@ -71,11 +71,11 @@ def talking_at(rate: int) -> Words:
 
 AT = SerialPort("/dev/ttyACM0")
 STRANGERS: dict[str, tuple[Words, str]] = {
-    "rubbish": (lambda data, baud: b"\xf8\x80\x9e\xe6" * 8, "only rubbish comes from PORT at 115200 baud"),
+    "garbled": (lambda data, baud: b"\xf8\x80\x9e\xe6" * 8, "only garbled bytes come from PORT at 115200 baud"),
     "silence": (lambda data, baud: b"", "nothing answers at PORT: is the printer switched on, and is 115200 baud"),
-    "a modem": (lambda data, baud: b"ERROR 42\r\n", "what answers at PORT is no printer: it says 'ERROR 42'"),
-    "an echo": (lambda data, baud: data, "what answers at PORT is no printer: it sends back what it receives"),
-    "a mill": (scripted({}, "error:20"), "what answers at PORT is no printer: it says 'error:20'"),
+    "a modem": (lambda data, baud: b"ERROR 42\r\n", "the device at PORT is not a printer: it says 'ERROR 42'"),
+    "an echo": (lambda data, baud: data, "the device at PORT is not a printer: it sends back what it receives"),
+    "a mill": (scripted({}, "error:20"), "the device at PORT is not a printer: it says 'error:20'"),
     "a halted one": (
         scripted({}, "Error:Printer halted. kill() called!"),
         "the printer at PORT has stopped with an error of its own (Error:Printer halted. kill() called!)",
@@ -83,7 +83,7 @@ STRANGERS: dict[str, tuple[Words, str]] = {
     "a busy one": (scripted({}, "echo:busy: processing"), "the printer at PORT is busy"),
     "three axes": (
         scripted({"M115": f"{NAMED}ok", "M114": "X:0.00 Y:0.00 Z:0.00 E:0.00 Count X:0 Y:0 Z:0\nok"}),
-        "the printer's firmware moves X Y Z, but generic A/C table needs X Y Z A C: A and C are missing (--force goes on)",
+        "the printer's firmware moves X Y Z, but generic A/C table needs X Y Z A C: A and C are missing (--force continues)",
     ),
     "Klipper": (
         scripted({"M115": "ok FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.12", "M114": "X:0.0 Y:0.0 Z:0.0 E:0.0\nok"}),
@@ -221,10 +221,10 @@ def test_a_program_for_another_machine_is_refused_unless_forced(
     with SimulatedPrinter(MACHINE) as printer:
         assert printed(printer.path, file, "--machine", "generic_ac") == 1
         sentence = f"part.gcode was made for the machine {foreign.machine.name}, not for {MACHINE.name}"
-        assert f"{sentence} (--force goes on)" in capsys.readouterr().err
+        assert f"{sentence} (--force continues)" in capsys.readouterr().err
         assert printer.record.lines == len(["M115", "M114"])
         assert printed(printer.path, file, "--machine", "generic_ac", "--force") == 0
-    assert f"{sentence}; going on because of --force" in capsys.readouterr().err
+    assert f"{sentence}; continuing because of --force" in capsys.readouterr().err
 
 
 def _machines() -> list[str]:
@@ -347,3 +347,9 @@ def test_klipper_is_not_asked_for_letters_that_the_start_block_makes() -> None:
 def test_a_program_at_the_limit_is_inside(reach: tuple[float, float], refused: bool) -> None:
     answer = Answer(Kind.PRINTER, "", "XYZAC", {"A": (-90.0, 90.0)})
     assert bool(exceeded_limit(answer, {"A": reach, "C": (-1e6, 1e6)})) is refused
+
+
+def test_a_mistyped_sim_is_not_taken_for_a_device() -> None:
+    with pytest.raises(PrinterError, match=r"^port simm does not exist: did you mean sim, the simulated printer\?$"):
+        parse_destination("simm")
+    assert parse_destination("COM3") == SerialPort("COM3")

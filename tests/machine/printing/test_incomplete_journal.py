@@ -33,7 +33,7 @@ def program_of(strokes: int) -> list[str]:
 PROGRAM = program_of(80)
 IN_PART_2 = len(PROGRAM) - 40
 LOST = "this print can no longer be resumed: journal "
-PROMISED = "goes on with it"
+PROMISED = "continues it"
 
 
 @pytest.fixture(autouse=True)
@@ -192,7 +192,7 @@ def test_a_rest_whose_journal_fails_is_resumed_neither_from_the_new_journal_nor_
         assert LOST in capsys.readouterr().err
         assert [resumed(printer, file) for file in (journal, rest)] == [1, 1]
     errors = capsys.readouterr().err.replace("\n", " ")
-    assert f"was resumed already, what became of it is in {rest}" in errors
+    assert f"was resumed already, its rest is in {rest}" in errors
     assert f"journal {rest} is incomplete" in errors
 
 
@@ -207,7 +207,7 @@ def test_after_a_restart_of_the_computer_a_person_must_look(
         assert len(printer.record.start) == moves
     errors = capsys.readouterr().err.replace("\n", " ")
     assert "this computer may have restarted since the print began, so the newest records may be missing" in errors
-    assert "a person must answer that question: resume at a terminal, without --yes" in errors
+    assert "you must answer that question: resume at a terminal, without --yes" in errors
 
 
 def test_a_journal_on_a_disk_that_was_unmounted_in_mid_print_is_told(

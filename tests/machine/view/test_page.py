@@ -109,12 +109,6 @@ def test_a_name_of_broken_letters_is_shown_with_marks() -> None:
     assert b"?.stl" in shown("\udcff.stl")[0]
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 MOVES = "G28\nM109 S200\nG1 Z0.2 F600\n;TYPE:Perimeter\nG1 X10 E1\nG1 Y10 E2\nM104 S0\nM140 S0\n"
 
 

@@ -2,7 +2,6 @@
 
 import json
 import time
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -10,14 +9,8 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from mdp.save import stl
-from tests.machine.running_workbench import PATIENCE_S, QUICK, Running, workbench
+from tests.machine.running_workbench import PATIENCE_S, Running
 from tests.shapes import tee
-
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Running]:
-    with workbench(*QUICK) as running:
-        yield running
 
 
 def above(bench: Running, path: str) -> str:

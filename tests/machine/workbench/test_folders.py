@@ -112,7 +112,7 @@ def test_work_of_a_newer_version_is_refused_and_stays(bench: Bench) -> None:
     with pytest.raises(PlanError, match="kept by a newer tiltprint, which can open it; it stays in"):
         read_folder(folder)
     (folder / RECORD).write_text('{"version": 1, "name"')
-    with pytest.raises(PlanError, match="is no work of a workbench, or damaged"):
+    with pytest.raises(PlanError, match="is not of a workbench, or damaged"):
         read_folder(folder)
     assert folders_kept() == [folder]
 
@@ -349,7 +349,7 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
         problem = page.until(lambda state: state["problem"])["problem"]
         assert problem.startswith("large.stl: has more than the 1 MiB that a page may send:")
         assert [bench.send(sent / name)[0] for name in (broken, "tee.stl", "plan.toml")] == [422, 200, 422]
-        assert json.loads(bench.send(sent / broken)[1])["problem"].startswith(f"{broken}: ")  # in no words of the page's
+        assert json.loads(bench.send(sent / broken)[1])["problem"].startswith(f"{broken} is ")  # in no words of the page's
         assert [names_in(folder) for folder in temporary.glob("tiltprint-edit-*") if names_in(folder)] == [["tee.stl"]]
     assert list(temporary.glob("tiltprint-edit-*")) == []
 

@@ -50,7 +50,7 @@ def test_a_terminal_has_the_options_and_the_keys() -> None:
     sentence = (
         f"{key_name('process.walls')} is 0: {option('parts', 4)}, {advice('set', 'process.walls=2', 'give')} ({FORCE_GOES_ON})"
     )
-    assert terminal_words(sentence) == "process.walls is 0: --parts 4, give --set process.walls=2 (--force goes on)"
+    assert terminal_words(sentence) == "process.walls is 0: --parts 4, give --set process.walls=2 (--force continues)"
 
 
 def test_an_error_keeps_its_marks_where_another_message_holds_it() -> None:

@@ -1,7 +1,6 @@
 """Several models on the plate of the workbench: how they get there, that they are printed as by the command line, and kept."""
 
 import json
-from collections.abc import Iterator
 from pathlib import Path
 from shlex import split
 from typing import Any
@@ -15,23 +14,16 @@ from machine.workbench.bench.settings import export_command
 from mdp.save import stl
 from profiles.errors import PlanError
 from profiles.profile import load
-from tests.machine.running_workbench import QUICK, Page, Running, workbench
+from tests.machine.running_workbench import Page, Running
 from tests.machine.workbench.models import changed, changed_bench, model
 from tests.shapes import box, tee
 
 
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Running]:
-    with workbench(*QUICK) as running:
-        yield running
-
-
 @pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "tee.stl").write_bytes(stl(tee()))
-    (tmp_path / "box.stl").write_bytes(stl(box(8, 8, 2)))
-    return tmp_path
+def folder(folder: Path) -> Path:
+    (folder / "tee.stl").write_bytes(stl(tee()))
+    (folder / "box.stl").write_bytes(stl(box(8, 8, 2)))
+    return folder
 
 
 def two(copies: int = 1) -> Bench:

@@ -6,7 +6,6 @@ import signal
 import socket
 import time
 import zipfile
-from collections.abc import Iterator
 from pathlib import Path
 from shlex import split
 from typing import Any
@@ -24,18 +23,6 @@ from tests.mdp.slicer_files import AT_ORIGIN, Made, Object, prusaslicer
 from tests.shapes import box, tee
 
 FOUND = ("front", "recommended", "cuts")
-
-
-@pytest.fixture(scope="module")
-def bench() -> Iterator[Running]:
-    with workbench(*QUICK) as running:
-        yield running
-
-
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
 
 
 def test_the_page_is_below_the_token_alone_and_keeps_to_itself(bench: Running) -> None:

@@ -620,6 +620,20 @@ def test_the_other_models_stay_in_the_picture_while_a_task_cuts_them_and_are_pla
     assert stood == [True, True, True]
 
 
+def test_a_trial_on_another_bench_does_not_have_the_present_one_prepared_again() -> None:
+    async def work(session: Session) -> None:
+        await settled(session)
+        before = session.readiness.number
+        await session.trials.attempt(replace(session.bench, model=model("b")), ())
+        session.do("copies", replace(session.bench, copies=2))
+        await settled(session)
+        prepared.append(session.readiness.number - before)
+
+    prepared: list[int] = []
+    when_done(work)
+    assert prepared == [0]
+
+
 def test_a_model_chosen_in_one_piece_stays_so_when_a_setting_changes() -> None:
     rows = (FrontRow((), 9.0, 0.0, 9.0), FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0, chosen=True))
 

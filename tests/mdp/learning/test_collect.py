@@ -37,7 +37,7 @@ def test_what_is_done_is_not_done_again_and_what_is_missing_comes_out_the_same_o
     reasons = {row.id: row.excluded for row in read_index(out) if row.orientation == 0}
     assert (reasons["tee"], reasons["flat"]) == ("", "nothing feasible")
     assert reasons["broken"].startswith("failed: ")
-    assert f"- broken.0.paper.npz: {models}/broken.stl: is not an STL file" in capsys.readouterr().out
+    assert f"- broken.0.paper.npz: {models}/broken.stl is not an STL file" in capsys.readouterr().out
 
     (out / "tee.1.paper.npz").unlink()
     (models / "broken.stl").unlink()
@@ -56,7 +56,7 @@ def test_an_interrupt_ends_all_processes_at_once(tmp_path: Path) -> None:
     time.sleep(1.0)
     os.killpg(run.pid, signal.SIGINT)
     assert run.stderr is not None
-    assert run.stderr.read() == "interrupted; started again, the collection goes on where it stopped\n"
+    assert run.stderr.read() == "interrupted; started again, the collection continues where it stopped\n"
     assert run.wait() == 130
     with pytest.raises(ProcessLookupError):  # the group is empty
         _until_gone(run.pid)
@@ -78,13 +78,13 @@ def _until_gone(group: int) -> None:
         (("--terms", "ours,mine"), "--terms has 'mine': paper, best, ours are allowed"),
         (
             ("--only", "tea"),
-            "folder {models}: holds no model with 'tea' in its name; .npz, {readers} are read",
+            "folder {models} holds no model with 'tea' in its name; .npz, {readers} are read",
         ),
         (("--set", "search.luck=1"), "search.luck is not a key of a profile (`profiles show` lists them)"),
         (("--luck",), "unrecognized arguments: --luck; --help shows what is allowed"),
         (
             ("--out", "{models}/tee.npz"),
-            "folder {models}/tee.npz: cannot be written ([Errno 17] File exists: '{models}/tee.npz')",
+            "folder {models}/tee.npz cannot be written ([Errno 17] File exists: '{models}/tee.npz')",
         ),
     ],
 )

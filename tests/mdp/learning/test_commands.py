@@ -108,4 +108,4 @@ def test_a_folder_without_records_and_an_unknown_baseline_are_told(
     assert train.main([str(records), "-o", str(tmp_path / "nowhere" / "a.onnx")]) == 1
     assert "cannot be written; a file in a folder that exists is needed" in capsys.readouterr().err
     assert evaluate.main([str(records), "--without", "luck"]) == 1
-    assert "--without luck: is not a baseline" in capsys.readouterr().err
+    assert "--without luck is not a baseline" in capsys.readouterr().err

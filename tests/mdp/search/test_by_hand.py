@@ -155,7 +155,7 @@ def test_a_page_shows_the_offset_of_a_refused_plane_with_one_decimal() -> None:
 
 
 def test_planes_in_an_impossible_order_are_refused() -> None:
-    assert "part 2 cannot be cut off: nothing is left above its plane, the parts printed after it took it" in _refusal(
+    assert "part 2 cannot be cut off: nothing is left above its plane, later parts have taken it: change the order" in _refusal(
         shapes.box(z=40.0), (UP, 30.0), (UP, 20.0)
     )
     assert len(_cut(shapes.box(z=40.0), (UP, 20.0), (UP, 30.0)).parts) == 3

@@ -12,7 +12,9 @@ PAGE = Path(__file__).parents[3] / "docs" / "plan.md"
 
 
 def test_the_example_of_the_page_is_read_as_the_page_says(tmp_path: Path) -> None:
-    (example,) = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    marks, example = re.findall(r"```toml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)
+    (tmp_path / "marks.toml").write_text(marks)
+    assert read_plan(tmp_path / "marks.toml").parts == ()
     (tmp_path / "mine.toml").write_text(example)
     plan = read_plan(tmp_path / "mine.toml")
     assert plan.parts == (PlannedPart((0.0, 0.6, 0.8), 31.0), PlannedPart((-0.6, 0.0, 0.8), None))

@@ -107,7 +107,7 @@ def test_a_trial_refuses_a_limb_that_would_leave_something_in_the_air() -> None:
 
 def test_a_limb_too_near_to_a_tower_is_refused_and_the_place_of_the_tower_is_shown() -> None:
     mesh = shapes.bar_beside_a_tower(gap=2.0)
-    with pytest.raises(PlanError, match="the head would meet what stands beside it"):
+    with pytest.raises(PlanError, match="the head would meet the print beside it"):
         _by_hand(mesh, BAR)
     trial = Trials(mesh, _profile()).attempt([plane for plane in (BAR.plane,) if plane is not None])
     assert trial.obstacle is not None

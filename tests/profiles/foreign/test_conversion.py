@@ -90,7 +90,7 @@ def test_a_filament_setting_becomes_ours(values: dict[str, str], key: str, value
         ({"perimeter_speed": "0"}, "as fast as the plastic melts"),
         ({"default_acceleration": "0"}, "the firmware's own"),
         ({"fill_pattern": "hilbertcurve"}, "has no equivalent here"),
-        ({"external_perimeter_speed": "50%"}, "perimeter_speed, which the file does not tell"),
+        ({"external_perimeter_speed": "50%"}, "perimeter_speed, which the file does not state"),
         ({"layer_height": "9"}, "a number from"),
         ({"layer_height": "thin"}, "is not a number"),
         ({"perimeters": "1e999"}, "is not a number"),
@@ -224,7 +224,7 @@ def test_a_report_has_the_words_of_the_file_and_what_was_made_of_them(
     assert (found.text, found.value, found.how) == row[1:]
 
 
-OF_NOZZLE = "a percentage of the nozzle, which the file does not tell"
+OF_NOZZLE = "a percentage of the nozzle, which the file does not state"
 
 
 @pytest.mark.parametrize(
@@ -257,7 +257,7 @@ OF_NOZZLE = "a percentage of the nozzle, which the file does not tell"
             {"external_perimeter_extrusion_width": "180%", "extrusion_width": "0.5"},
             "external_perimeter_extrusion_width",
             "180%",
-            "a percentage of layer_height, which the file does not tell",
+            "a percentage of layer_height, which the file does not state",
         ),
     ],
 )

@@ -292,14 +292,14 @@ def test_settings_in_a_damaged_zip_are_refused_in_one_sentence(
     tmp_path: Path, damaged: Callable[[Path, str, str], Path], name: str, member: str
 ) -> None:
     file = damaged(tmp_path / name, member, "[general]\nversion = 4\n[values]\nwall_line_count = 3\n" * 9)
-    with pytest.raises(ProfileError, match=r"x\.\w+: (is not a Cura profile|the settings inside it are damaged) \(.+\)$"):
+    with pytest.raises(ProfileError, match=r"x\.\w+(: the settings inside it are damaged| is not a Cura profile) \(.+\)$"):
         read_config(file)
 
 
 def test_json_without_end_is_refused_in_one_sentence(tmp_path: Path) -> None:
     block = f"; prusaslicer_json_config = begin\n; {'[' * 100_000}\n; prusaslicer_json_config = end\n"
     for name, text in (("print.gcode", block), ("preset.json", '{"a": ' + "[" * 100_000)):
-        with pytest.raises(ProfileError, match=rf"^profile .*{name}: .*recursion"):
+        with pytest.raises(ProfileError, match=rf"^profile .*{name}\W.*recursion"):
             read_config(written(tmp_path, name, text))
 
 

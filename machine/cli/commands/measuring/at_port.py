@@ -72,7 +72,7 @@ class PrinterMover:
         return "" if self._top is None else "the tip is raised, "
 
     def retreat(self) -> None:
-        """Raise the tip to its greatest height so far after an error, even if the printer answers no more."""
+        """Raise the tip to its greatest height so far after an error, even if the printer no longer answers."""
         if self._top is None:
             return
         try:

@@ -34,7 +34,7 @@ def write_program(request: CalibrationRequest, profile: Profile, out: Path) -> i
     show(
         f"fix a pointed mark, {height:g} mm high, {radius:g} mm from the middle of the plate\n"
         f"run {out}: it takes the cold nozzle to the mark at {len(touches.poses)} poses\n"
-        f"each time bring the tip onto the mark, note X Y Z in {sheet}, then go on\n"
+        f"each time bring the tip onto the mark, note X Y Z in {sheet}, then continue\n"
         f"then: tiltprint calibrate --machine {request.given.machine} --measured {sheet}\n"
     )
     return 0

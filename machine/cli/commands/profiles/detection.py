@@ -71,7 +71,7 @@ def read_file(file: Path) -> ConfigText:
         with file.open("rb") as stream:
             content = stream.read(MOST_BYTES + 1)
     except OSError as error:
-        raise ProfileError(f"{file}: cannot be read ({reason(error)})") from None
+        raise ProfileError(f"{file} cannot be read ({reason(error)})") from None
     wide = content.startswith((BOM_UTF16_LE, BOM_UTF16_BE))  # as PowerShell's > writes
     if len(content) > MOST_BYTES or (b"\0" in content and not wide):
         raise ProfileError(f"{file}: it is not a configuration: a text of less than {MOST_BYTES >> 20} MiB is expected")

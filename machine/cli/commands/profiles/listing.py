@@ -47,14 +47,15 @@ def _origin(model: Frozen, key: str) -> str:
     return next((f"from: {model.sources[path]}" for path in paths if path in model.sources), "")
 
 
-def save(name: str, settings: Sequence[str], out: Path) -> int:
-    """Write a profile with changed settings as a profile file."""
-    from machine.pipeline.output import check_writable, write_bytes
+def save(name: str, settings: Sequence[str], out: Path, replace: bool) -> int:
+    """Write a profile with changed settings as a profile file. replace: overwrite a file, which is kept beside it."""
+    from machine.pipeline.output import check_writable, refuse_to_overwrite, write_own
     from machine.pipeline.profile_file import profile_text
 
     check_writable(out)
+    refuse_to_overwrite(out, replace)
     kind = kind_of(name)
-    write_bytes(out, profile_text(kind, name, settings).encode())
+    write_own(out, profile_text(kind, name, settings), replace)
     say(f"saved: {out}; use it as --{kind} {out}")
     return 0
 

@@ -62,8 +62,7 @@ def test_every_model_has_a_row_and_its_gcode_is_that_of_export(tmp_path: Path, c
     rows = rows_of(out / "export.csv")
     assert {name: row["status"] for name, row in rows.items()} == {"box.stl": DONE, "broken.stl": REFUSED, "tee.stl": DONE}
     assert (
-        rows["broken.stl"]["sentence"]
-        == "broken.stl: is not an STL file: neither binary nor ASCII with `solid` and `facet` in it"
+        rows["broken.stl"]["sentence"] == "broken.stl is not an STL file: neither binary nor ASCII with `solid` and `facet` in it"
     )
     assert (rows["box.stl"]["files"], rows["box.stl"]["parts"]) == ("box.gcode", "1")
     assert capsys.readouterr().out.startswith("3 models: 2 done, 1 refused; to print: ")
@@ -159,7 +158,8 @@ def test_two_models_of_one_name_do_not_write_over_each_other(tmp_path: Path) -> 
     assert main(command) == 0
     (folder / "tee.ply").write_text("no mesh")
     assert main(command) == 1
-    assert {name: row["sentence"].partition(":")[0] for name, row in rows_of(out / "export.csv").items()} == {
+    names = {name: row["sentence"].partition(" is not")[0].partition(":")[0] for name, row in rows_of(out / "export.csv").items()}
+    assert names == {
         "tee.ply": "tee.ply",
         "tee.stl": "tee.stl would have the files of tee.ply",
     }
@@ -171,8 +171,8 @@ def test_two_models_of_one_name_do_not_write_over_each_other(tmp_path: Path) -> 
 
 def test_reasons_are_counted_whatever_models_and_numbers_they_name(tmp_path: Path) -> None:
     rows = [
-        Row("a.stl", REFUSED, sentence="a.stl: is not closed: 188 open edges"),
-        Row("b.stl", REFUSED, sentence="b.stl: is not closed: 3 open edges"),
+        Row("a.stl", REFUSED, sentence="a.stl is not closed: 188 open edges"),
+        Row("b.stl", REFUSED, sentence="b.stl is not closed: 3 open edges"),
         Row("c.stl", FAILED, sentence="c.stl: it took longer than 1 s"),
         Row("d.stl", time_s=3600.0, filament_mm=2500.0),
     ]

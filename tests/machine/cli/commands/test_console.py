@@ -144,7 +144,7 @@ def test_a_port_where_no_printer_is_gets_the_sentence_of_print(
     hear_out(monkeypatch, ports)
     with on_terminal(lambda data, baud: data) as path:
         assert piped("G28\n", path) == 1
-    assert f"what answers at {path} is no printer: it sends back what it receives" in capsys.readouterr().err
+    assert f"the device at {path} is not a printer: it sends back what it receives" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize(("options", "words"), [
@@ -211,7 +211,7 @@ def test_ctrl_c_while_the_printer_heats_leaves_with_the_heaters_off() -> None:
         person.see("W:?")  # the prompt waits for keys by now
         person.see("W:?")
         person.press("\x03")
-        person.see("switched off: heaters, for a command was under way")
+        person.see("switched off: heaters, because a command was running")
         assert person.end() == 130
 
 

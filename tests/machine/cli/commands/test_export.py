@@ -8,8 +8,10 @@ import pytest
 
 from machine.cli.cli import main
 from machine.cli.commands.export import default_gcode, draw_layer, parse_layer
+from machine.pipeline.requests import ModelRequest
 from mdp.save import stl
 from profiles.errors import OutputError, SliceError
+from profiles.profile import load
 from tests.machine.cli.test_cli import FAST
 from tests.machine.hand import printed
 from tests.shapes import box
@@ -53,7 +55,26 @@ def test_a_file_in_the_way_that_cannot_be_read_is_refused_in_a_sentence(tmp_path
     monkeypatch.setattr(Path, "open", refuse)
     monkeypatch.setattr(Path, "read_bytes", refuse)
     with pytest.raises(OutputError, match=r"^output box.gcode exists and cannot be read: permission denied; -o names"):
-        default_gcode("box.stl")
+        default_gcode("box.stl", ModelRequest("box.stl", load()))
+
+
+def test_export_without_a_name_leaves_the_g_code_of_another_model_of_that_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for file in ("box.stl", "a/box.stl", "b/box.stl"):
+        Path(file).parent.mkdir(exist_ok=True)
+        Path(file).write_bytes(stl(box(8, 8, 2)))
+    Path("box.obj").write_bytes(Path("box.stl").read_bytes())
+    export = ["export", *FAST, "--as-is"]
+    assert [main([*export, "a/box.stl"]), main([*export, str(tmp_path / "a" / "box.stl")])] == [0, 0]
+    written = Path("box.gcode").read_bytes()
+    assert written.endswith(b"; folder = a\n")
+    for other in ("b/box.stl", "box.stl", "box.obj"):
+        assert main([*export, other]) == 1
+        assert "output box.gcode exists and was made of another model: -o names another file" in capsys.readouterr().err
+    assert Path("box.gcode").read_bytes() == written
+    assert main([*export, "box.stl", "-o", "box.gcode"]) == 0
 
 
 def test_export_without_a_name_writes_the_model_s_here_and_ends_with_a_verdict(
@@ -68,4 +89,4 @@ def test_export_without_a_name_writes_the_model_s_here_and_ends_with_a_verdict(
     assert main(["export", "box.stl", *FAST]) == 1
     assert "output box.gcode exists and was not written by tiltprint: -o names another file" in capsys.readouterr().err
     assert main(["print", "box.stl", *FAST, "--as-is", "--port", "sim"]) == 0
-    assert re.search(r"\ndone in \d+s\n$", capsys.readouterr().out)
+    assert re.search(r"\ndone in \d+s: \d+s before the print, \d+s of printing\n$", capsys.readouterr().out)

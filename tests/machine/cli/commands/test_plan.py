@@ -22,12 +22,6 @@ FAST += ["--set", "search.cut_mm2=20", "--set", "search.beam_width=2"]
 PARTS = ["part-01.stl", "part-02.stl", "decomposition.3mf"]
 
 
-@pytest.fixture
-def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    return tmp_path
-
-
 def _run(*arguments: str) -> None:
     """A command that prints the model as it is, unless its arguments say otherwise."""
     assert main([arguments[0], "--as-is", *arguments[1:], *FAST]) == 0

@@ -99,12 +99,12 @@ def test_asking_ends_when_it_is_called_off() -> None:
 
 @pytest.mark.parametrize(("kind", "words", "line"), [
     (Kind.SILENT, "", "nothing answers"),
-    (Kind.RUBBISH, "", "rubbish at 9600 baud, and nothing at the usual other rates: --baud N tries another"),
-    (Kind.STRANGER, "AT+OK", "something answers but is no printer: it says 'AT+OK'"),
-    (Kind.STRANGER, "M115", "something answers but is no printer: it sends back what it receives"),
+    (Kind.GARBLED, "", "garbled bytes at 9600 baud, and nothing at the usual other rates: --baud N tries another"),
+    (Kind.STRANGER, "AT+OK", "a device answers but is not a printer: it says 'AT+OK'"),
+    (Kind.STRANGER, "M115", "a device answers but is not a printer: it sends back what it receives"),
     (Kind.HALTED, "Error:MAXTEMP", "a printer that has stopped with an error (Error:MAXTEMP), at 9600 baud"),
     (Kind.STARTING, "FIRMWARE_NAME:Klipper", "a printer that is still starting (Klipper), at 9600 baud"),
-    (Kind.BUSY, "", "a printer that is busy (it heats, moves or waits for a person), at 9600 baud"),
+    (Kind.BUSY, "", "a printer that is busy (it heats, moves or waits for its user), at 9600 baud"),
     (Kind.PRINTER, "", "a printer that does not name its firmware, at 9600 baud"),
 ])  # fmt: skip
 def test_every_kind_of_answer_has_its_words(kind: Kind, words: str, line: str) -> None:

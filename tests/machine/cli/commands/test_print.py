@@ -101,7 +101,7 @@ def test_a_stopped_print_names_the_journal_to_go_on_with(hours: str, tmp_path: P
     ):
         person.see("layer 1 of 1")
         person.press("\x03")
-        person.see(f"tiltprint resume {journal} goes on with it")
+        person.see(f"tiltprint resume {journal} continues it")
         assert person.end() == 130
 
 

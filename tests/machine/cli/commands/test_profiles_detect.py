@@ -180,7 +180,7 @@ def test_who_prints_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[
         job.files["a.gcode"] = b"G28\n"
         job.start("a.gcode")
         job.state = "paused"
-        assert "is paused a.gcode now: ask it when that is done" in refusal(capsys, tmp_path / "k.toml", "--port", address)
+        assert "is paused a.gcode now: try again when that is done" in refusal(capsys, tmp_path / "k.toml", "--port", address)
     from_card = {"M115": "FIRMWARE_NAME:Marlin 2.1\nok", "M114": PLACE, "M27": "SD printing byte 5/99\nok"}
     with on_terminal(scripted(from_card)) as port:
         assert "is at work (SD printing byte 5/99)" in refusal(capsys, tmp_path / "m.toml", "--port", port)
@@ -209,7 +209,7 @@ def test_who_does_not_tell_its_settings_here_is_one_sentence(
     with SimulatedPrinter(load("fractal5pro").machine) as klipper:
         assert "--port moonraker:HOST" in refusal(capsys, out, "--port", klipper.path)
     with on_terminal(scripted({"M115": "FIRMWARE_NAME:Smoothieware\nok", "M114": PLACE})) as port:
-        assert "Smoothieware, whose settings cannot be asked for" in refusal(capsys, out, "--port", port)
+        assert "Smoothieware, whose settings cannot be queried" in refusal(capsys, out, "--port", port)
     with stand_in("octoprint") as (_, address):
         assert "does not know its firmware's settings" in refusal(capsys, out, "--port", address)
 

@@ -81,7 +81,7 @@ def test_a_profile_that_is_there_is_not_written_over(tmp_path: Path) -> None:
 
 def test_a_file_that_is_not_there_is_one_sentence(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["profiles", "import", "nowhere.ini"]) == 1
-    assert "profile nowhere.ini: cannot be read (no such file or directory)" in capsys.readouterr().err
+    assert "profile nowhere.ini cannot be read (no such file or directory)" in capsys.readouterr().err
 
 
 def test_settings_whose_values_cannot_be_taken_are_no_strangers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -194,7 +194,7 @@ def test_without_a_terminal_one_interrupt_leaves_and_two_cancel(interrupts: int,
         command = [sys.executable, "-c", HASTY, *print_of(address)]
         process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, cwd=ROOT)
         assert process.stderr is not None
-        for words in (b"printing: ", b"the print goes on at")[:interrupts]:
+        for words in (b"printing: ", b"the print continues at")[:interrupts]:
             next(line for line in process.stderr if line.startswith(words))
             process.send_signal(signal.SIGINT)
         process.communicate()

@@ -147,9 +147,9 @@ def test_what_keeps_no_settings_is_refused(capsys: pytest.CaptureFixture[str]) -
     damaged = prusaslicer(Path("b.3mf"), [Object([Made(POST)], [AT_ORIGIN])], {"Metadata/project_settings.config": "{"})
     Path("a.stl").write_bytes(stl(from_manifold(POST)))
     for models, sentence in (
-        (["a.3mf"], "a.3mf: holds no print settings"),
+        (["a.3mf"], "a.3mf holds no print settings"),
         ([damaged.name], "profile b.3mf: the settings inside it are damaged"),
-        (["a.stl"], "--settings-of-file: a.stl is no .3mf that a slicer has saved"),
+        (["a.stl"], "--settings-of-file: a.stl is not a .3mf in which a slicer has saved"),
         (["a.3mf", "a.stl"], "--settings-of-file goes with one model, and several are given: a.3mf, a.stl"),
     ):
         assert main(["export", *models, "-o", "out.gcode", "--settings-of-file", *FAST]) == 1

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from machine.cli.terminal.at_terminal import KEYS, render, status_line
 from machine.cli.terminal.keys import MORE
-from machine.link.print_state import PrintStatus
+from machine.link.print_state import PrintState, PrintStatus
 from machine.link.protocol.events import Temperature
 from machine.printing.job import Scene
 from tests.machine.dryrun.test_timeline import TIMELINE
@@ -102,3 +102,10 @@ def test_a_long_word_of_the_printer_is_wrapped_and_cut() -> None:
 
 def test_the_explanation_of_q_fits_on_two_lines() -> None:
     assert len(lines(MOMENT, hint=MORE, width=80)) <= 7
+
+
+def test_a_print_that_is_being_cancelled_shows_no_time_left() -> None:
+    moment = PrintStatus(PrintState.CANCELLING, temperature=Temperature(210.0, 0.0, 60.0, 0.0), left_s=None, share=0.5)
+    assert status_line(moment) == "cancelling"
+    assert status_line(replace(moment, message="the printer is waited for")) == "cancelling; the printer is waited for"
+    assert not any("as last known 0 s" in line for line in lines(moment))

@@ -326,7 +326,7 @@ def test_without_a_terminal_the_way_to_cancel_is_said(
 ) -> None:
     board, control, clock = board_and_control(monkeypatch, terminal=False)
     board.interrupt()
-    assert capsys.readouterr().err == "the print goes on at octoprint:octopi: interrupt again within 2 s to cancel it\n"
+    assert capsys.readouterr().err == "the print continues at octoprint:octopi: interrupt again within 2 s to cancel it\n"
     clock.now_s = ALONE_S - 0.1
     board.interrupt()
     assert commands_of(control) == [Command.CANCEL]

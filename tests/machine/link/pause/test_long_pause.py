@@ -96,7 +96,7 @@ def test_a_cooled_pause_says_what_will_happen_and_goes_on_to_the_same_print() ->
     assert not watcher.run(PROGRAM).cancelled
     assert watcher.shown_at(COOLS_S - 5.0).message == ""
     assert watcher.shown_at(COOLS_S + 5.0).message == (
-        "the nozzle was switched off after 2 min; when the print goes on it is heated to 200 °C and filled where the tip "
+        "the nozzle was switched off after 2 min; when the print continues it is heated to 200 °C and filled where the tip "
         "waits: take the drop off"
     )
     assert is_exact(watcher)

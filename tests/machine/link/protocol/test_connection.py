@@ -140,7 +140,7 @@ def test_a_printer_that_takes_no_greeting_is_told_by_what_it_said() -> None:
         table.say(b"Error: Missing checksum\n")
         table.wait(3.1)
     assert str(table.connection.fault) == (
-        "the printer did not take 6 greetings: the last that it said was 'Error: Missing checksum'"
+        "the printer did not accept 6 greetings: its last answer was 'Error: Missing checksum'"
     )
 
 
@@ -202,7 +202,7 @@ def test_a_printer_that_answers_only_lines_without_numbers_is_told_from_one_that
     table = converse(Counting(0, b"", takes_numbers=False))
     assert str(table.connection.fault) == (
         "the printer answers M115, but neither M110 nor any line with a number and a checksum: this program sends no other "
-        "lines, for a damaged one could not be detected"
+        "lines, because a damaged one could not be detected"
     )
 
 
@@ -647,7 +647,7 @@ def test_a_device_that_is_no_printer_is_told_by_its_own_words() -> None:
     while table.connection.fault is None and table.now_s < 100:
         table.say(b"$GPGGA,123519,4807.038,N\r\n")
         table.wait(1.0)
-    assert "no printer that this program knows: to 6 greetings it said '$GPGGA,123519,4807.038,N'" in str(table.connection.fault)
+    assert "not a known printer: to 6 greetings it sent '$GPGGA,123519,4807.038,N'" in str(table.connection.fault)
 
 
 @pytest.mark.parametrize("said", [b"\x00\xf8start\n", b"echo: Last Updated: 2024-09-29 | Author: (none)\n", b"Grbl 1.1h\n",

@@ -260,6 +260,66 @@ def test_a_z_offset_that_klipper_would_keep_for_the_next_print_is_taken_back(end
 
 
 @every_kind
+@pytest.mark.parametrize("end", [PrintState.DONE, PrintState.CANCELLED])
+def test_feed_and_flow_are_set_back_when_a_print_ends(kind: str, end: PrintState) -> None:
+    control = Control()
+    with printing(kind) as (job, server):
+        control.ask(Command.FEED, 150.0)
+        control.ask(Command.FLOW, 90.0)
+
+        def watch(status: PrintStatus, message: str) -> None:
+            if job.commands[-1:] == ["M221 S90"] and end is PrintState.CANCELLED:
+                control.ask(Command.CANCEL)
+            elif job.commands[-1:] == ["M221 S90"]:
+                job.steps = 1
+
+        assert run(server, control, watch) is end
+    overrides = [command for command in job.commands if command.startswith("M22")]
+    assert overrides == ["M220 S150", "M221 S90", "M220 S100", "M221 S100"]
+
+
+def test_a_print_that_is_left_still_needs_its_feed_and_the_end_says_so() -> None:
+    control = Control()
+    with printing("moonraker") as (job, server):
+        control.ask(Command.FEED, 150.0)
+        left = lambda: bool(job.commands)  # noqa: E731
+        follower = Follower(server, UPLOAD.name, 1, on_status=ignore, control=control, left=left)
+        assert follower.run() is PrintState.LEFT
+    assert job.commands == ["M220 S150"]
+    assert follower.kept == "the printer keeps the feed of 150 %: before another print send it M220 S100"
+
+
+def test_a_failed_print_tells_what_the_printer_keeps() -> None:
+    control = Control()
+    with printing("moonraker") as (job, server):
+        control.ask(Command.FEED, 150.0)
+
+        def watch(status: PrintStatus, message: str) -> None:
+            if job.commands:
+                job.state = "error"
+
+        with pytest.raises(ServerError, match="the printer keeps the feed of 150 %: before another print send it M220 S100"):
+            run(server, control, watch)
+
+
+def test_octoprint_does_not_say_whether_the_firmware_knows_a_z_offset() -> None:
+    control, messages = Control(), set[str]()
+    with printing("octoprint") as (_, server):
+        control.ask(Command.BABYSTEP, -0.01)
+
+        def watch(status: PrintStatus, message: str) -> None:
+            messages.add(message)
+            if message:
+                control.ask(Command.EMERGENCY_STOP)
+
+        left = lambda: False  # noqa: E731
+        Follower(server, UPLOAD.name, 1, on_status=watch, control=control, left=left, babystep="M290 Z{}").run()
+    assert [message.partition("(")[2] for message in messages if message.startswith("sent M290 Z-0.010, but ")] == [
+        "Marlin needs BABYSTEPPING): see that the tip moves"
+    ]
+
+
+@every_kind
 def test_a_z_offset_is_refused_where_the_firmware_is_not_known(kind: str) -> None:
     control, told = Control(), set[str]()
     with printing(kind) as (job, server):
@@ -404,9 +464,9 @@ def test_a_server_that_is_gone_during_a_print_is_told_of(kind: str, monkeypatch:
             if status.state is PrintState.PRINTING:
                 job.refuse = dict.fromkeys(STATUS, (502, "Bad Gateway"))
 
-        with pytest.raises(ServerError, match="the print may go on, look at the printer"):
+        with pytest.raises(ServerError, match="the print may continue: look at the printer"):
             run(server, Control(), away)
-    assert re.fullmatch("no answer for [0-9]+ s: whether the print goes on there is not known", messages[-1])
+    assert re.fullmatch("no answer for [0-9]+ s: whether the print continues there is unknown", messages[-1])
 
 
 def cancelled_there(job: Job, message: str) -> None:
@@ -428,7 +488,7 @@ def dies_and_comes_back(job: Job, message: str) -> None:
 HAPPENINGS = [
     (KINDS, dies_and_comes_back, r"no longer prints box\.gcode \(ready\); last known: .*nozzle 210 °C, bed 60 °C"),
     (("octoprint", "moonraker"), cancelled_there, r"no longer prints box\.gcode"),
-    (("octoprint", "moonraker"), another_is_printed, r"prints other\.gcode now: what became of box\.gcode is not known"),
+    (("octoprint", "moonraker"), another_is_printed, r"prints other\.gcode now: what happened to box\.gcode is unknown"),
 ]
 
 
@@ -569,13 +629,13 @@ def test_an_answer_without_end_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> N
     monkeypatch.setattr(http, "MOST_BYTES", 1_000_000)
     with stand_in("octoprint") as (job, address), session_with(address) as server:
         job.refuse["/api/version"] = (200, b"x" * 2_000_000)
-        with pytest.raises(ServerError, match="answers with more than 1 MB: it is no print server"):
+        with pytest.raises(ServerError, match="answers with more than 1 MB: it is not a print server"):
             server.greet()
 
 
 def test_an_answer_that_drips_is_not_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(http, "WHOLE_S", -1.0)
-    no_end = pytest.raises(NoAnswerError, match="does not come to the end of its answer")
+    no_end = pytest.raises(NoAnswerError, match="sends an answer without an end")
     with stand_in("octoprint") as (_, address), session_with(address) as server, no_end:
         server.greet()
 
@@ -613,7 +673,7 @@ def test_a_server_whose_answer_never_comes_is_lost_too(monkeypatch: pytest.Monke
     over = threading.Event()
     monkeypatch.setattr(follow, "JOIN_S", 0.01)
     try:
-        with pytest.raises(ServerError, match="octoprint:host; no answer for 0 s: the print may go on, look at the printer"):
+        with pytest.raises(ServerError, match="octoprint:host; no answer for 0 s: the print may continue: look at the printer"):
             follow_unanswered(lambda: PrintStatus(PrintState.READY if over.wait(60.0) else PrintState.FAILED))
     finally:
         over.set()
@@ -628,7 +688,9 @@ def test_a_server_that_answers_nothing_but_errors_is_lost(monkeypatch: pytest.Mo
             return PrintStatus(PrintState.PRINTING, file="box.gcode")
         raise ServerError("octoprint:host refuses") if look < 299 else ZeroDivisionError
 
-    with pytest.raises(ServerError, match="octoprint:host refuses; no answer for 0 s: the print may go on, look at the printer"):
+    with pytest.raises(
+        ServerError, match="octoprint:host refuses; no answer for 0 s: the print may continue: look at the printer"
+    ):
         follow_unanswered(status)
 
 

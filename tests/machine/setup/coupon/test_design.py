@@ -43,7 +43,7 @@ def test_the_usual_factors_differ_from_the_process_whatever_it_has() -> None:
         (["brim_mm=3"], "--vary brim_mm=3: brim_mm cannot differ from bar to bar"),
         (["interface_flow=1.1"], "the process has that value itself, so the bars would be alike"),
         (["interface_flow=1.1", "process.interface_flow=1.2"], "interface_flow is given twice"),
-        ([f"walls={k}" for k in range(6)], "--vary is given 6 times: 8 bars can tell 5 settings apart at most"),
+        ([f"walls={k}" for k in range(6)], "--vary is given 6 times: 8 bars can distinguish at most 5 settings"),
     ],
 )
 def test_what_bars_cannot_be_printed_with_is_refused(given: list[str], said: str) -> None:

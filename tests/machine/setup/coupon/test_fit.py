@@ -75,7 +75,7 @@ def test_too_few_loads_are_refused(told: int) -> None:
 def test_loads_that_do_not_tell_settings_apart_are_refused() -> None:
     sheet = broken(TRUTH, 3)
     loads = tuple(load if k in (0, 1, 8, 9, 10) else (NAN,) for k, load in enumerate(sheet.loads_n))
-    with pytest.raises(ProfileError, match="do not tell the settings apart"):
+    with pytest.raises(ProfileError, match="do not distinguish the settings"):
         evaluate(replace(sheet, loads_n=loads))
 
 

@@ -133,7 +133,7 @@ def test_what_may_stand_in_a_file_that_is_missing_is_not_taken_for_absent() -> N
     text = (STEPPERS + GIMBAL).replace("steppers/*.cfg", "mainsail.cfg").replace("[heater_bed]\nmax_temp: 125\n", "")
     told = read(ConfigText("printer.cfg", text))
     assert {"bed_limit_c", "arcs"}.isdisjoint(told.settings)
-    assert told.remarks[0] == "mainsail.cfg is not beside it: what stands there is not known"
+    assert told.remarks[0] == "mainsail.cfg is not beside it: its settings are unknown"
 
 
 def test_moonrakers_names_in_small_letters_are_those_of_the_file_and_null_is_nothing() -> None:

@@ -107,7 +107,7 @@ def test_an_axis_of_a_small_letter_is_not_that_of_the_large_one() -> None:
 def test_a_macro_that_is_not_beside_the_file_is_named() -> None:
     assert found(CRADLE + 'M98 P"drives.g"\n').remarks == []
     told = read(ConfigText("config.g", SPEEDS + CRADLE.replace("speeds.g", "drives.g")))
-    assert told.remarks == ["drives.g is not beside it: what stands there is not known"]
+    assert told.remarks == ["drives.g is not beside it: its settings are unknown"]
 
 
 def test_an_axis_of_which_no_speed_is_told_is_kept_and_said() -> None:

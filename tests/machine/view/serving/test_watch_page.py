@@ -82,7 +82,7 @@ def test_who_does_not_know_the_token_of_the_address_is_shown_nothing(watched: Wa
     answer, content = asked_without_token(watched, path)
     assert (answer.status, content) == (
         404,
-        b"this page is at the address that tiltprint has told, which is another one with each start\n",
+        b"open the address that tiltprint printed at its start: it changes each time\n",
     )
 
 

@@ -100,7 +100,7 @@ def test_nothing_is_homed_or_moved_over_a_table_that_is_tilted_or_of_which_nothi
 
 
 def test_homing_is_what_the_start_block_does_without_its_heat() -> None:
-    assert homing_lines(filled_start(PROFILE), dialect_of(MACHINE)) == ["G21", "G90", "M83", "G28 X Y Z", "G92 A0 C0"]
+    assert homing_lines(filled_start(PROFILE), dialect_of(MACHINE)) == ["G21", "G90", "M83", "M17", "G28 X Y Z", "G92 A0 C0"]
     assert homing_lines(filled_start(FRACTAL), dialect_of(FRACTAL.machine))[-2:] == ["home_ab", "G28"]
     with pytest.raises(MoveError, match="homes nothing"):
         homing_lines(["M104 S200"], dialect_of(MACHINE))

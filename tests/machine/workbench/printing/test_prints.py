@@ -161,12 +161,12 @@ def test_whoever_dies_the_heaters_go_off(
     assert (last["name"], last["outcome"]) == ("hour", "cancelled" if expected == "the print was stopped" else "failed")
 
 
-GOES_ON = "is printing hour.gcode and goes on without this program: its own page commands it"
+GOES_ON = "is printing hour.gcode and continues without this program: control it on the server's page"
 
 
 @pytest.mark.parametrize(("end", "expected"), [
     (kill, f"{DIED}; {{address}} {GOES_ON}"),
-    (hang_up, "hour goes on printing on {address}: this page follows it no more"),
+    (hang_up, "hour keeps printing on {address}: this page no longer follows it"),
 ])  # fmt: skip
 def test_whoever_dies_a_print_server_goes_on_and_its_key_is_told_nowhere(
     end: Callable[[Prints, RunningPrint], None], expected: str, monkeypatch: pytest.MonkeyPatch
@@ -304,7 +304,9 @@ def test_an_incomplete_journal_is_refused_at_the_page_with_the_sentence_of_resum
         journal.path.rename(tmp_path / "moved")
     end, _ = carry_out(rest_of(tmp_path / "moved", "/dev/none"), AtPage(Heard()))  # type: ignore[arg-type]
     assert end.state == "refused"
-    assert end.sentence.startswith(f"journal {tmp_path / 'moved'} is incomplete: its print went on when the journal could not")
+    assert end.sentence.startswith(
+        f"journal {tmp_path / 'moved'} is incomplete: its print continued after the journal could no longer"
+    )
 
 
 def test_the_page_is_told_at_once_that_a_print_can_no_longer_be_resumed_and_names_no_journal_any_more(tmp_path: Path) -> None:
@@ -390,7 +392,7 @@ def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.Monke
     monkeypatch.setenv(VARIABLE, KEY)
     monkeypatch.setattr(follow, "POLL_S", 0.05)
     stopped = "emergency stop: {0} has taken it; restart the printer before the next print; nozzle 210 °C, bed 60 °C as last"
-    left = "hour goes on printing on {0}: this page follows it no more"
+    left = "hour keeps printing on {0}: this page no longer follows it"
     with stand_in("duet") as (job, address):
         job.steps = 10_000
         wanted = order(address, profile=load("gen5x"))
