@@ -4,9 +4,10 @@ Keys of the header besides `arrays`: format (1); title, summary, made_by; source
 live (`state` can be requested); time_s, filament_mm, filament; lines of the file, 0 for parts alone; types, names of `;TYPE:`;
 layers_by (`comments` or `heights`); thinned, {rows, kept} of a simplified print; text, {patterns, zeros}; parts: number, rows,
 pose, base plane, volume, risky areas, joint, ranges in `vertices` and `faces` (index 0 without `;PART:`); machine: the kinematic
-keys of the profile with unit axes, known false for a guess; front: the rows of `decompose --json` with the bases of parts 2, 3,
-... (a point belongs to the last part whose plane it is above, else to part 1); findings, row -1 for the whole print; report:
-facts and tables, all texts. null: unknown.
+keys of the profile with unit axes, known false for a guess; front: the rows of `decompose --json` with `figures` [[name, value,
+unit]] and the bases of parts 2, 3, ... (a point belongs to the last part whose plane it is above, else to part 1); findings, row
+-1 for the whole print; report: facts and tables, all texts.
+null: unknown.
 """
 
 from collections.abc import Sequence

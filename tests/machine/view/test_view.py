@@ -40,13 +40,13 @@ def example(machine: str = "generic_ac") -> tuple[Profile, Program]:
 @cache
 def shown(machine: str = "generic_ac") -> tuple[dict[str, Any], Arrays]:
     profile, program = example(machine)
-    return unpacked(of_print("post and arm", program, profile))
+    return unpacked(of_print("post and arm", program, profile, True, (), False))
 
 
 def read(text: str, profile: Profile = PLAIN) -> tuple[dict[str, Any], Arrays]:
     """The page of a G-code text."""
     lines = tuple(text.split("\n"))
-    return unpacked(of_print("text", Program(lines, dry_run(lines, profile), None), profile))
+    return unpacked(of_print("text", Program(lines, dry_run(lines, profile), None), profile, True, (), False))
 
 
 @given(arrays.arrays(np.int64, st.tuples(st.integers(0, 40), st.integers(1, 5)), elements=WHOLE))
@@ -236,7 +236,7 @@ def test_a_guessed_machine_finds_nothing_of_its_own() -> None:
     text = "G28\nG1 Z0.2 F600\nG1 X9999\nG1 X0 E1"
     lines = tuple(text.split("\n"))
     codes = [
-        {finding["code"] for finding in unpacked(of_print("text", program, PLAIN, known=known))[0]["findings"]}
+        {finding["code"] for finding in unpacked(of_print("text", program, PLAIN, known, (), False))[0]["findings"]}
         for program, known in [(Program(lines, dry_run(lines, PLAIN), None), known) for known in (True, False)]
     ]
     assert codes[0] - codes[1] == {"axis-limit", "off-plate"}
@@ -246,7 +246,7 @@ def test_a_guessed_machine_finds_nothing_of_its_own() -> None:
 def test_the_same_print_gives_the_same_bytes() -> None:
     profile, program = example()
     again = Program(program.lines, dry_run(program.lines, profile), program.decomposition, program.sliced)
-    assert of_print("a", program, profile) == of_print("a", again, profile)
+    assert of_print("a", program, profile, True, (), False) == of_print("a", again, profile, True, (), False)
 
 
 @pytest.mark.parametrize(
