@@ -324,7 +324,7 @@ def test_a_broken_model_is_told_and_the_one_before_it_stays(browser: Browser, be
     choose(browser, "<img onerror=alert(1)>.stl", stl(tee())[:400])
     browser.wait("!$('problem').hidden")
     problem = "is cut short: it holds 6 of the 28 facets that its header announces"
-    assert browser.value("$('problem').textContent") == f"<img onerror=alert(1)>.stl: {problem}"
+    assert browser.value("$('problem').textContent") == f"<img onerror=alert(1)>.stl {problem}"
     assert browser.value("$('title').textContent") == "tee.stl"
 
 
