@@ -160,10 +160,10 @@ def test_a_name_that_is_no_ranker_is_told_with_those_that_are() -> None:
 @pytest.mark.parametrize(
     ("content", "sentence"),
     [
-        (None, "there is no such file"),
-        (b"", "is not an ONNX file"),
-        (b"solid", "is not an ONNX file"),
-        (5000, "is not an ONNX file"),
+        (None, ": there is no such file"),
+        (b"", " is not an ONNX file"),
+        (b"solid", " is not an ONNX file"),
+        (5000, " is not an ONNX file"),
     ],
 )
 def test_a_missing_a_foreign_and_a_truncated_file_are_a_sentence(
@@ -172,7 +172,7 @@ def test_a_missing_a_foreign_and_a_truncated_file_are_a_sentence(
     file = tmp_path / "mine.onnx"
     if content is not None:
         file.write_bytes(shipped().file.read_bytes()[:content] if isinstance(content, int) else content)
-    with pytest.raises(UserError, match=rf"^ranker \S+mine\.onnx: {sentence}[^\n]*$"):
+    with pytest.raises(UserError, match=rf"^ranker \S+mine\.onnx{sentence}[^\n]*$"):
         ranker_named(str(file))
 
 

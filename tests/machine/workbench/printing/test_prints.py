@@ -174,7 +174,11 @@ def test_whoever_dies_a_print_server_goes_on_and_its_key_is_told_nowhere(
     monkeypatch.setenv(VARIABLE, KEY)
     with stand_in("octoprint") as (job, address):
         job.steps = 10_000
-        ended = print_until(address, lambda current: current.state.live and current.state.state == "printing", end)
+
+        def has_begun(current: RunningPrint) -> bool:  # the page says "printing" while it still asks the server to begin
+            return job.state == current.state.state == "printing" and current.state.live
+
+        ended = print_until(address, has_begun, end)
         assert job.state == "printing"
     assert ended.sentence == expected.format(address=address)
     assert job.files["hour.gcode"].decode() == HOUR
