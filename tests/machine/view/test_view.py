@@ -205,7 +205,7 @@ def test_the_front_is_told_whole_with_its_planes_in_print_order() -> None:
     front = (
         FrontRow((), 100.0, 0.0, 100.0, time_s=60.0, filament_mm=1000.0),
         FrontRow((side,), 0.0, 40.0, 24.0, chosen=True, reason="the least cost"),
-        FrontRow((top, side), 0.0, 40.0, 23.9),
+        FrontRow((top, side), 0.0, 40.0, 23.9, flaw="the nozzle could break off part 3"),
     )
     profile, decomposition, _, _ = hand.printed()
     header, _ = unpacked(of_parts(replace(decomposition, name="the arm.stl", front=front), profile))
@@ -213,6 +213,7 @@ def test_the_front_is_told_whole_with_its_planes_in_print_order() -> None:
     assert (whole["planes"], whole["time_s"], whole["filament_mm"], whole["why"]) == ([], 60.0, 1000.0, "")
     assert (taken["chosen"], taken["why"]) == (True, "the least cost")
     assert (taken["time_s"], taken["filament_mm"]) == (None, None)
+    assert more["why"] == "the nozzle could break off part 3"
     assert [plane["normal"] for plane in more["planes"]] == [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     assert more["command"] == "tiltprint decompose 'the arm.stl' --parts 3"
 

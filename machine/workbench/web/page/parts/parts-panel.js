@@ -68,7 +68,7 @@ function tellRow(row) {
   $("front").setAttribute("aria-valuetext", partsInWords(row.parts) + (best ? ", recommended" : ""));
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [
-    ["parts", `${row.parts}${byHand ? ", changed by hand since" : best ? ` (recommended: ${row.why})` : ""}`],
+    ["parts", `${row.parts}${byHand ? ", changed by hand since" : row.why && (best || !row.chosen) ? ` (${best ? "recommended" : "only on request"}: ${row.why})` : ""}`],
     ...figures.map(([name, value, unit]) => [name, value ? `${value} ${unit}`.trimEnd() : unknown]),
   ]);
 }
