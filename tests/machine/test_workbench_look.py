@@ -30,6 +30,11 @@ COVERED = """[...document.querySelectorAll('#handles button')].filter((knob) => 
   const others = [...document.querySelectorAll('#plane-tools, #handles button')].filter((one) => one !== knob);
   return others.some((one) => over(one.getBoundingClientRect()));
 }).map((knob) => knob.id)"""
+# Pairs of things over the picture that cover one another.
+OVERLAPS = """(() => { const seen = ['axes', 'tools', 'plane-tools', 'legend', 'notice'].filter((id) => $(id).checkVisibility());
+  const boxes = seen.map((id) => [id, $(id).getBoundingClientRect()]).filter(([, box]) => box.width);
+  return boxes.flatMap(([id, a], k) => boxes.slice(k + 1).filter(([, b]) => (
+    a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom)).map(([other]) => [id, other])); })()"""
 UNDO = "$('undo').getAttribute('aria-label')"
 SMALL = (900, 560)
 
@@ -88,6 +93,30 @@ def test_no_letter_is_small_and_one_button_is_the_next_step(browser: Browser, be
         assert browser.value("document.documentElement.scrollWidth <= innerWidth")
     browser.resize(*SMALL)
     assert seen == {"model": ["slice"], "parts": ["slice"], "slices": ["slice"], "printing": ["check"], "settings": ["slice"]}
+
+
+@pytest.mark.parametrize("size", [(720, 560), (390, 720)])
+def test_axes_tools_notices_and_legend_of_a_small_picture_do_not_cover_one_another(
+    browser: Browser, bench: Running, size: tuple[int, int]
+) -> None:
+    browser.resize(*size)
+    with_plane(browser, bench)
+    drag_slider(browser, "section-along", '"x"', "change")
+    low = "{ view.camera.lookFrom(0, 0); $('fit').click(); view.camera.zoom(0.6); view.camera.pan(0, 0.4); view.picture.ask(); }"
+    browser.value(low)
+    browser.wait("$('plane-tools').getBoundingClientRect().top < $('hand-along').getBoundingClientRect().top")
+    placed = browser.value(OVERLAPS)
+    browser.click("[data-view=corner]")
+    browser.click("#fit")
+    browser.wait("$('plane-tools').getBoundingClientRect().top > $('hand-along').getBoundingClientRect().top")
+    browser.value("modules['template/elements'].notice('a notice that is longer than one line of a small picture', 'test')")
+    noticed = browser.value(OVERLAPS)
+    browser.click("#tab-printing")
+    printing = browser.value(OVERLAPS)
+    browser.resize(*SMALL)
+    browser.value("modules['template/elements'].notice('', 'test')")
+    drag_slider(browser, "section-along", '""', "change")
+    assert (placed, noticed, printing) == ([], [], [])
 
 
 def test_settings_are_as_narrow_as_a_window_that_becomes_narrow(browser: Browser, bench: Running) -> None:

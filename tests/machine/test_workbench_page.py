@@ -68,7 +68,7 @@ def area(browser: Browser) -> float:
     return float(browser.value("$('overhang').textContent").removesuffix(" mm²"))
 
 
-def drag_slider(browser: Browser, slider: str, value: float, event: str) -> None:
+def drag_slider(browser: Browser, slider: str, value: float | str, event: str) -> None:
     browser.value(f"{{ $('{slider}').value = {value}; $('{slider}').dispatchEvent(new Event('{event}')); }}")
 
 

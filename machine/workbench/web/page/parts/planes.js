@@ -130,15 +130,16 @@ function sectionNow(picture) {
   return last.section;
 }
 
-const GAP_PX = 24, RIM_PX = 8, TOP_PX = 56; // of the tools: from model and knobs, and from the picture's edges
+const GAP_PX = 24, RIM_PX = 8, TOP_PX = 56, BELOW_AXES_PX = 100; // of the tools: from model and knobs, and from the picture's edges
 
-/** The tools of the chosen plane beside the model, level with y; where there is no room at the picture's lower edge, or below its upper one where that hides less of what is seen within so many pixels of y. */
+/** Place the tools of the chosen plane beside the model, level with y, or without room there at the picture's lower edge, or at its upper one if that hides less of what lies within so many pixels of y. */
 function putTools(picture, [, y], within) {
   const tools = $("plane-tools"), { clientWidth: width, clientHeight: height } = $("scene"), [wide, high] = [tools.offsetWidth, tools.offsetHeight];
   const { offsetLeft, offsetWidth, offsetHeight } = $("legend"), free = offsetLeft + offsetWidth + RIM_PX, narrow = free + wide + RIM_PX > width; // nothing hides the legend
   const low = height - high - RIM_PX - (narrow ? offsetHeight + RIM_PX : 0), ends = cornersOf(picture.box()).map(picture.placeOf), left = Math.max(...ends.map((end) => (end ? end[0] : width))) + GAP_PX;
-  const hidden = [TOP_PX + high - y, y - low].map((over) => over + within + GAP_PX), edge = hidden[1] > Math.max(hidden[0], 0) ? TOP_PX : low;
-  putAt(tools, left + wide + RIM_PX < width ? [left, clamp(y - high / 2, TOP_PX, low)] : [Math.max((width - wide) / 2, narrow ? 0 : free), edge]);
+  const top = $("tools").offsetTop < TOP_PX ? BELOW_AXES_PX : TOP_PX; // in a small picture the other tools stand at its upper edge
+  const hidden = [top + high - y, y - low].map((over) => over + within + GAP_PX), edge = hidden[1] > Math.max(hidden[0], 0) ? top : low;
+  putAt(tools, left + wide + RIM_PX < width ? [left, clamp(y - high / 2, top, low)] : [Math.max((width - wide) / 2, narrow ? 0 : free), edge]);
 }
 
 const HEAD_ON = 0.02; // sine between a normal and the sight, below which no side is across what is seen
