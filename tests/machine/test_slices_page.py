@@ -175,6 +175,21 @@ def test_parts_appear_are_compared_looked_at_and_marked_when_the_bench_changes(b
     assert browser.complaints == []
 
 
+def test_a_refused_slicing_opens_no_preview_of_what_another_page_slices(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "flat.stl", stl(box(9, 9, 1)))
+    browser.click("#tab-slices")
+    refused = "function (text) { window.sending.call(this, text.replace('\"slice\"', '\"compare\"')); }"
+    browser.value(f"window.sending = WebSocket.prototype.send; WebSocket.prototype.send = {refused}")
+    browser.click("#slice")
+    browser.wait("!$('problem').hidden")
+    browser.value("{ WebSocket.prototype.send = window.sending; }")
+    with bench.line() as page:
+        page.do("slice")
+    browser.wait("$('verdict-told').textContent.startsWith('Ready to print') && $('slicing-bar').hidden")
+    browser.wait("new Promise((drawn) => requestAnimationFrame(() => drawn(true)))")
+    assert browser.value("$('print-page').hidden && !document.body.classList.contains('looking')")
+
+
 def slice_with_errors(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "box.stl", stl(box(20, 20, 2)))
     with bench.line() as page:
@@ -194,6 +209,7 @@ def test_a_finding_leads_to_its_place_and_errors_are_saved_only_on_demand(browse
     assert chosen == "error: cold-extrusion"
     assert f"line {line}" in browser.value("document.querySelector('#sliced-findings .error small').textContent")
     browser.click("#leave-print")
+    assert browser.value("document.activeElement.id") == "look"
     browser.click("#save")
     assert "found errors" in browser.value("$('save-gcode').innerText")
     browser.click("#save-gcode")

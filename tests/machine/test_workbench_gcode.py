@@ -51,6 +51,8 @@ def test_a_dropped_file_with_errors_shows_them_and_is_refused_like_print(tmp_pat
     with workbench(*QUICK) as running, small_browser() as browser:
         opened(browser, running, "far.gcode", GOOD.replace("X10", "X5000"))
         assert "problem" in browser.value("$('gcode-told').textContent")
+        browser.click("#leave-print")
+        assert browser.value("document.activeElement.id") == "tab-printing"
         browser.click("#check")
         browser.wait("!$('print-problem').hidden && !$('force-line').hidden")
         assert "5000" in browser.value("$('print-problem').textContent")

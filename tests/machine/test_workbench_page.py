@@ -117,6 +117,13 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     browser.key("1")  # a view, not a step
     browser.click("#undo")
     browser.wait("$('front').value === $('front').max && !$('redo').disabled")
+    note = "{ text: 'one part would do', parts: 1 }"
+    browser.value(f"modules['page/store'].update({{ state: {{ ...modules['page/store'].store.state, notes: [{note}] }} }})")
+    assert browser.value("$('front-notes').innerText").split("\n")[-1].endswith("Choose 1 part")
+    browser.click("#front-notes button")
+    browser.wait("$('front').value === '0' && $('undo').ariaLabel === 'undo: take another number of parts'")
+    browser.click("#undo")
+    browser.wait("$('front').value === $('front').max && !$('redo').disabled")
     assert "oriented on" not in browser.value("$('front-notes').textContent")
     with bench.line() as second_page:
         second_page.do("set", key="search.seam_mm", value="100")  # too dear to be cut

@@ -90,9 +90,15 @@ def test_settings_are_found_by_other_slicers_words_and_taken_back_by_the_profile
     browser.click("#level-simple")
     keys = "[...$('settings-list').querySelectorAll('.setting')].map((row) => row.dataset.key)"
     browser.wait(f"{keys}.includes('process.walls') && !{keys}.includes('process.seam_gap')")
+    assert not browser.value("$('ranking').checkVisibility() || $('modifier-help').checkVisibility()")
     for words, key in (("perimeters", "process.walls"), ("cooling", "material.fan"), ("raft", "search.pedestal_mm")):
         browser.value(f"{{ $('search-settings').value = '{words}'; $('search-settings').dispatchEvent(new Event('input')); }}")
         assert key in browser.value(keys)
+    browser.value("{ $('search-settings').value = 'modifiers'; $('search-settings').dispatchEvent(new Event('input')); }")
+    assert "Parts lists them under Protected areas" in browser.value("$('modifier-help').innerText")
+    browser.click("#level-advanced")
+    assert browser.value("$('ranking').checkVisibility()")
+    browser.click("#level-simple")
     browser.value("{ $('search-settings').value = ''; $('search-settings').dispatchEvent(new Event('input')); }")
     put(browser, "process.walls", 5)
     put(browser, "material.nozzle_c", 222)
