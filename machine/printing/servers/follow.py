@@ -11,6 +11,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from math import inf
 
 from machine.link.pending_commands import (
     FEED_PERCENT,
@@ -70,6 +71,7 @@ class Follower:
         self._last_active: PrintState | None = self.running.state if self.running else None
         self._read, self._heat = 0, Temperature()
         self._cancels = False  # the server has or may have the order
+        self._cancelled_s = inf  # when the server had carried it out
         self._began_s: float | None = None  # when the server was ordered to start
         self._failed: Exception | None = None  # by the start, or by a thread
         self._shown: tuple[PrintStatus | None, str] = (None, "")
@@ -202,6 +204,8 @@ class Follower:
     def _end_unseen(self, status: PrintStatus, waited_s: float) -> PrintState | None:
         """End of a print that was never seen running: the status may still be of an earlier print, or it ended before the first
         poll."""
+        if self._heard[2] > self._cancelled_s:
+            return PrintState.CANCELLED
         if waited_s < BEGIN_S:
             return None
         if status.state is PrintState.DONE and status.file in ("", self.file):
@@ -259,6 +263,7 @@ class Follower:
         except ServerError:
             self._cancels = False
             raise
+        self._cancelled_s = time.monotonic()
 
     def _set_percent(self, command: Command, value: float) -> None:
         self.server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")

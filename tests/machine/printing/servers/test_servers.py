@@ -278,6 +278,16 @@ def test_feed_and_flow_are_set_back_when_a_print_ends(kind: str, end: PrintState
     assert overrides == ["M220 S150", "M221 S90", "M220 S100", "M221 S100"]
 
 
+@every_kind
+def test_a_print_cancelled_before_it_was_seen_running_ends_as_cancelled(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("machine.printing.servers.follow.POLL_S", 0.6)
+    control = Control()
+    control.ask(Command.CANCEL)
+    with printing(kind) as (job, server):
+        assert run(server, control) is PrintState.CANCELLED
+        assert job.state != "printing"
+
+
 def test_a_print_that_is_left_still_needs_its_feed_and_the_end_says_so() -> None:
     control = Control()
     with printing("moonraker") as (job, server):
