@@ -60,7 +60,10 @@ DIALECT = Dialect(
     follow_off="G49",
     follow_keeps_coordinates=True,
     filament_mode="set",
-    stands=("G92 X{x_mm} Y{y_mm} Z{z_mm} {tilt}{tilt_deg} {turn}{turn_deg}",),
+    stands=(
+        "M17",
+        "G92 X{x_mm} Y{y_mm} Z{z_mm} {tilt}{tilt_deg} {turn}{turn_deg}",
+    ),
     wait_for_person=("M0 {text}",),
     commands=COMMANDS,
 )

@@ -59,7 +59,10 @@ DIALECT = Dialect(
     parts="M486 T{parts}",
     part_begin='M486 S{index} A"part {number}"',
     part_end="M486 S-1",
-    stands=("G92 X{x_mm} Y{y_mm} Z{z_mm} {tilt}{tilt_deg} {turn}{turn_deg}",),
+    stands=(
+        "M17",
+        "G92 X{x_mm} Y{y_mm} Z{z_mm} {tilt}{tilt_deg} {turn}{turn_deg}",
+    ),
     endstop_word="H",
     statements=frozenset({"IF", "ELIF", "ELSE", "WHILE", "BREAK", "CONTINUE", "ABORT", "ECHO", "VAR", "GLOBAL", "SET", "SKIP"}),
     wait_for_person=('M291 P"{text}" R"calibrate" S3 X1 Y1 Z1',),

@@ -19,7 +19,14 @@ from machine.gcode.modes import E_AXIS, ModalState, axes_of
 from machine.kinematics.collision import Printed
 from machine.link.journal import EVERY_LINES, Checkpoint
 from machine.link.line_history import shifts
-from machine.link.pause.park_moves import axis_position, filament_commands, heat_commands, homed_return_moves, return_moves
+from machine.link.pause.park_moves import (
+    axis_position,
+    filament_commands,
+    heat_commands,
+    homed_return_moves,
+    homes_z,
+    return_moves,
+)
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import KEEPS_OFFSET
 from machine.link.print_state import PrintState, ProgramPosition
@@ -151,8 +158,10 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     if not status.greeted:
         _check_begun(status, begun)
     before = _approach(point, profile, *position_at_interruption(point, profile), homes=True)
-    words = f"; its Z offset of {offset_mm:+g} mm is set again" if offset_mm else ""
-    return ResumePoint(point.line, before, f"the printer has restarted; {span}{words}", homes=True, z_offset_mm=offset_mm)
+    again = homes_z(profile.machine)
+    words = f"; its Z offset of {offset_mm:+g} mm is {'set again' if again else 'kept'}" if offset_mm else ""
+    held_mm = offset_mm if again else 0.0  # else the axis itself has it
+    return ResumePoint(point.line, before, f"the printer has restarted; {span}{words}", homes=True, z_offset_mm=held_mm)
 
 
 def _offset_in_words(offset_mm: float) -> str:

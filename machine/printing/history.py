@@ -8,7 +8,7 @@ import json
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from time import time
+from time import monotonic, sleep, time
 from typing import Any, BinaryIO
 
 from machine.dryrun.dryrun import summary
@@ -22,6 +22,7 @@ from profiles.folders import state_folder
 
 FOLDER = "prints"
 MOST_PRINTS = 100  # files that are kept, the newest ones
+LOCKED_WITHIN_S = 1.0
 NOT_PRINTED = (PrintState.DECLINED, PrintState.REFUSED)
 
 
@@ -77,7 +78,12 @@ def _new_file() -> BinaryIO:
     folder.mkdir(0o700, exist_ok=True)
     keep_newest(_files(), MOST_PRINTS - 1, lambda file: file.name, is_being_printed)
     file = (folder / f"{dated_name()}.json").open("xb")
-    lock(file.fileno())
+    until_s = monotonic() + LOCKED_WITHIN_S
+    while not lock(file.fileno()):  # another process is reading it
+        if monotonic() > until_s:
+            file.close()
+            raise OutputError(f"{file.name} cannot be locked")
+        sleep(0.01)
     return file
 
 

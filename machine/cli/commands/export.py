@@ -73,7 +73,10 @@ def export(request: ModelRequest, of_folder: str = "") -> int:
 def folder_line(model: str) -> str:
     """A comment with the folder of a model that is in neither this folder nor the program, so that the same default name is not
     taken for another model's; "" otherwise."""
-    folder = "." if model.startswith(DEMO) else os.path.relpath(Path(model).resolve().parent)
+    try:
+        folder = "." if model.startswith(DEMO) else os.path.relpath(Path(model).resolve().parent)
+    except ValueError:  # on another drive of Windows
+        folder = str(Path(model).resolve().parent)
     return "" if folder == "." else comment(f"folder = {folder}")
 
 

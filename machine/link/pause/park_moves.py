@@ -168,12 +168,15 @@ def return_moves(profile: Profile, printed: Printed, way: Turn) -> list[str]:
 
 
 def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequence[str], z_offset_mm: float = 0.0) -> list[str]:
-    """Way back for a firmware that lost its position: set the axes, run `heat`, lift the tip, home X and Y, set the Z offset that
-    the way starts with, return_moves().
+    """Way back for a firmware that lost its position: set the axes, run `heat`, lift the tip, home X and Y, return_moves().
 
-    machine.gcode.resume replaces the homing if the profile has it. Raises JournalError, MoveError, ProfileError.
+    machine.gcode.resume replaces the homing if the profile has it. If that homes Z, the Z offset that the way starts with is set
+    again; otherwise Z is set to its programmed value, so that the axis keeps the offset: Marlin ignores M290 until Z is homed.
+    Raises JournalError, MoveError, ProfileError.
     """
     machine, dialect = profile.machine, dialect_of(profile.machine)
+    if not homes_z(machine):
+        way, z_offset_mm = replace(way, at_mm=way.at_mm - np.array([0.0, 0.0, z_offset_mm])), 0.0
     height = _clear_z_mm(profile, printed, way.start) + max(0.0, z_offset_mm)  # the print is higher than programmed
     values = resume_placeholders(machine, way.at_mm, way.start, height)
     named = key_name("machine.gcode.resume")
@@ -186,6 +189,12 @@ def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequ
     after = heat if machine.gcode.resume else ()
     offset = [dialect.babystep.format(f"{z_offset_mm:.3f}")] if z_offset_mm else []
     return ["G21", "G90", *homing, *after, *offset, *return_moves(profile, printed, raised)]
+
+
+def homes_z(machine: Machine) -> bool:
+    """Whether machine.gcode.resume homes Z."""
+    homings = (line.split(";")[0].upper().split() for line in machine.gcode.resume.splitlines())
+    return any(words[:1] == ["G28"] and (len(words) == 1 or any("Z" in word for word in words[1:])) for words in homings)
 
 
 def _clear_z_mm(profile: Profile, printed: Printed, pose: Pose) -> float:

@@ -109,13 +109,14 @@ class Follower:
 
     def _undo_settings(self) -> None:
         """Take back the settings that the firmware would keep for the next print, as far as the server accepts it."""
-        with suppress(ServerError):
-            for command in percents_undone(*self._feed_and_flow):
-                self.server.command(command)
-            self._percents.clear()
-            if self._offset_mm and self.babystep.endswith(KEEPS_OFFSET):
+        if self._offset_mm and self.babystep.endswith(KEEPS_OFFSET):
+            with suppress(ServerError):
                 self.server.command(offset_undone(self._offset_mm, self.babystep))
                 self._offset_mm = 0.0
+        for command in percents_undone(*self._feed_and_flow):
+            with suppress(ServerError):
+                self.server.command(command)
+                self._percents.pop(Command.FEED if command.startswith("M220") else Command.FLOW)
 
     @property
     def _feed_and_flow(self) -> tuple[float, float]:
@@ -266,7 +267,12 @@ class Follower:
         self._cancelled_s = time.monotonic()
 
     def _set_percent(self, command: Command, value: float) -> None:
-        self.server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")
+        """Set feed or flow. An order without an answer may have been executed."""
+        try:
+            self.server.command(f"{'M220' if command is Command.FEED else 'M221'} S{value:g}")
+        except NoAnswerError:
+            self._percents[command] = value
+            raise
         self._percents[command] = value
 
     def _shift(self, by_mm: float) -> str:

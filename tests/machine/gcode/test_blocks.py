@@ -76,6 +76,12 @@ def test_a_line_is_refused_where_its_firmware_refuses_it(dialect: str, line: str
     assert list(refused_lines([line, ";a comment", ""], dialects()[dialect])) == ([line] if is_refused else [])
 
 
+@pytest.mark.parametrize("dialect", ["marlin", "reprapfirmware"])
+def test_axes_set_where_they_stand_after_a_restart_are_held_by_their_motors_first(dialect: str) -> None:
+    motors, axes = dialects()[dialect].stands
+    assert (motors, axes.split()[0]) == ("M17", "G92")
+
+
 def test_a_table_levelled_by_hand_is_held_by_its_motors_from_the_start() -> None:
     """Marlin (planner.cpp) and RepRapFirmware switch a motor on by its first move, not by G92: the first part has no turn."""
     starts = {name: filled_start(load(machine=name)) for name in shipped("machine")}

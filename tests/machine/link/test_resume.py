@@ -17,6 +17,7 @@ from machine.gcode.modes import ModalState, axes_of
 from machine.link import status
 from machine.link.journal import Checkpoint, Journal, JournalContents, JournalHeading, read_journal
 from machine.link.medium import SERIAL, Medium, Wire
+from machine.link.pause.park_moves import homes_z
 from machine.link.pending_commands import Command, Control
 from machine.link.port import open_port
 from machine.link.print_state import PrintState, PrintStatus
@@ -248,18 +249,26 @@ def test_a_print_whose_host_has_died_keeps_its_z_offset_and_takes_it_back(text: 
     assert [line for line in sent if line.startswith(("M290", "M22"))] == ["M220 S100", "M221 S100", "M290 Z-0.100"]
 
 
-def test_after_a_power_cut_the_z_offset_is_set_again_once_the_tip_has_risen(text: GcodeFile) -> None:
+def test_after_a_power_cut_the_axis_keeps_the_z_offset_which_marlin_does_not_set_before_z_is_homed(text: GcodeFile) -> None:
     printer = VirtualPrinter(PROFILE.machine)
     story = shifted_then_killed(text, printer)
     stands_mm = printer.record.end[-1, 2]
     printer.firmware.reset()
     way, sent = resumed(text, printer, story)
     set_mm = next(float(match[1]) for line in way.before if (match := re.match(r"G92 X.* Z(\S+)", line)))
-    assert set_mm == pytest.approx(stands_mm, abs=0.005)
-    across = next(number for number, line in enumerate(way.before) if line.startswith("G0 X"))
-    assert way.before.index("G28 X Y") < way.before.index("M290 Z0.100") < across
+    assert set_mm == pytest.approx(stands_mm - 0.1, abs=0.005)
+    assert way.before.index("M17") < way.before.index("G28 X Y")
+    assert (way.z_offset_mm, way.reason.endswith("its Z offset of +0.1 mm is kept")) == (0.0, True)
+    assert not [line for line in sent if line.startswith("M290")]
     assert heights_of_strokes(printer) == {63.1, 63.3}
-    assert sent.count("M290 Z-0.100") == 1
+
+
+@pytest.mark.parametrize(("block", "homes"), [
+    ("", False), ("G28 X Y", False), ("; G28 Z", False), ("G28 Z F100\nG28 X Y", True), ("g28", True), ("G28 XZ ; all", True),
+])  # fmt: skip
+def test_a_resume_block_homes_z_by_g28_alone_or_with_that_letter(block: str, homes: bool) -> None:
+    gcode = PROFILE.machine.gcode.model_copy(update={"resume": block})
+    assert homes_z(PROFILE.machine.model_copy(update={"gcode": gcode})) is homes
 
 
 def test_a_print_that_begins_anew_says_that_its_z_offset_is_lost() -> None:
@@ -276,10 +285,12 @@ def test_a_firmware_that_cannot_set_the_z_offset_of_an_interrupted_print_is_refu
     printer.firmware.reset()
     moves = len(printer.record.end)
     monkeypatch.setattr(commands, "THERE", ())
+    gcode = PROFILE.machine.gcode.model_copy(update={"resume": "G28 Z\nG28 X Y\nG0 Z{clear_z_mm} F900"})
+    homing = PROFILE.model_copy(update={"machine": PROFILE.machine.model_copy(update={"gcode": gcode})})
     with pytest.raises(PrinterError, match=r"a Z offset of \+0.1 mm, which this firmware cannot set: nothing was moved"):
         print_lines(
             text, PATH, medium=printer.medium, profile=PROFILE,
-            begin=lambda seen: plan_resume(cut_off(text, story.last), seen, PROFILE),
+            begin=lambda seen: plan_resume(cut_off(text, story.last), seen, homing),
         )  # fmt: skip
     assert len(printer.record.end) == moves
 

@@ -70,6 +70,19 @@ def test_a_print_that_goes_on_is_not_listed_and_one_that_was_killed_has_failed()
     assert [(past["name"], past["outcome"], past["seconds"]) for past in past_prints()] == [("killed", "failed", None)]
 
 
+def test_a_reader_that_holds_the_file_for_a_moment_does_not_leave_it_unlocked(monkeypatch: pytest.MonkeyPatch) -> None:
+    held = [True, True]
+    monkeypatch.setattr(history, "lock", lambda descriptor: not held.pop() if held else lock(descriptor))
+
+    def act() -> End:
+        (file,) = folder().iterdir()
+        with file.open("rb") as other:
+            assert not lock(other.fileno(), shared=True)
+        return DONE
+
+    assert printed("vase", act) is DONE
+
+
 def test_a_print_of_another_process_goes_on_until_that_ends(tmp_path: Path) -> None:
     program = """
 from machine.link.print_state import PrintState

@@ -288,6 +288,23 @@ def test_a_print_cancelled_before_it_was_seen_running_ends_as_cancelled(kind: st
         assert job.state != "printing"
 
 
+def test_a_feed_without_an_answer_may_be_in_force_and_is_set_back(monkeypatch: pytest.MonkeyPatch) -> None:
+    control = Control()
+    with printing("moonraker") as (job, server):
+        command = server.command
+
+        def silent(line: str) -> None:
+            command(line)
+            job.steps = 1
+            if line == "M220 S150":
+                raise NoAnswerError("it has stopped answering")
+
+        monkeypatch.setattr(server, "command", silent)
+        control.ask(Command.FEED, 150.0)
+        assert run(server, control) is PrintState.DONE
+    assert job.commands == ["M220 S150", "M220 S100"]
+
+
 def test_a_print_that_is_left_still_needs_its_feed_and_the_end_says_so() -> None:
     control = Control()
     with printing("moonraker") as (job, server):

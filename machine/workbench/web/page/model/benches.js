@@ -34,7 +34,7 @@ let uploaded = Promise.resolve(); // when the last file has been sent: one after
 
 /** Send a file to a bench, with progress and a Cancel button. Resolves when the server has answered; errors arrive by the connection. how: more of its address. */
 const sendFile = (file, how = {}, to = "") => new Promise((answered) => {
-  uploaded = uploaded.then(() => new Promise((sent) => upload(file, how, to, sent, answered)));
+  uploaded = uploaded.catch(() => {}).then(() => new Promise((sent) => upload(file, how, to, sent, answered)));
 });
 
 function upload(file, how, to, sent, answered) {

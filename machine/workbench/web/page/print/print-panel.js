@@ -245,7 +245,7 @@ export function printPanel() {
   webcamPanel(print);
   handPanel((asked) => toldTo({ do: "by_hand", ...asked }));
   listen("toggle", { "rest-field": () => { if ($("rest-field").open) send({ do: "journals" }); } });
-  listen("change", { which: () => { chosen = numberIn("which"); show(state); } });
+  listen("change", { which: () => { chosen = numberIn("which"); $("sure").hidePopover(); show(state); } });
   for (const id of ["feed", "flow"]) {
     const letGo = () => delete $(id).dataset.held;
     listen("input", { [id]: () => { $(id).dataset.held = true; tell({ [`${id}-told`]: `${$(id).value} %` }); } });

@@ -136,7 +136,9 @@ export function handPanel(ask) {
 }
 
 export function showHand(print, commands) {
-  hide({ "hand-live": print?.state !== IN_HAND || !commands });
+  const isShut = print?.state !== IN_HAND || !commands;
+  hide({ "hand-live": isShut });
+  if (isShut) $("hand-sure").hidePopover();
   for (const button of $("hand-jog").children) button.disabled = !print?.homed;
 }
 
