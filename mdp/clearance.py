@@ -3,8 +3,8 @@ limb.
 
 A body point at b from the tip is n . b + z above the table, n the table's normal in the machine frame and z the tip's height
 above the table; with the table unbounded, z >= max over the bodies of -n . b keeps all of them clear. For one body reaching y
-across the tilt axis on the rising side at height h this is z >= y sin t - h cos t. A part of the cradle that rises above the
-table is not under that plane: it is tested against the head at every position of the tip.
+across the tilt axis on the rising side at height h this is z >= y sin t - h cos t. Clips, and a part of the cradle that rises
+above the table, are not under that plane: they are tested against the head at every position of the tip.
 
 A part cut off by a whole plane has nothing printed above its base plane. A limb has: other pieces stand beside it. The head is
 modelled as everything above its underside: the silhouette turned about the nozzle, and boxes that are extended to the nozzle. A
@@ -85,26 +85,26 @@ def find_obstacle(machine: Machine, pose: Pose, points_mm: Floats) -> str | None
     lowest, (needed, body, _) = float(points_mm[:, 2].min()), lowest_body(machine, pose)
     if lowest < needed:
         return f"the head's {body} would meet the table: the part begins {lowest:.1f} mm above it, {needed:.1f} mm are needed"
-    met = _find_in_cradle(machine, pose, reached)
-    return None if met is None else f"the head's {met[0]} would meet the cradle's {met[1]}"
+    return _find_box(machine, pose, reached)
 
 
-def _find_in_cradle(machine: Machine, pose: Pose, tips_mm: Floats) -> tuple[str, str] | None:
-    """The head's body and the cradle's box that could collide with the tip anywhere in the hull of (n, 3) machine points; None if
-    a separating direction exists for each pair. Only boxes that rise above the table are tested.
+def _find_box(machine: Machine, pose: Pose, tips_mm: Floats) -> str | None:
+    """Which body of the head could meet which clip or box of the cradle with the tip anywhere in the hull of (n, 3) machine
+    points; None if a separating direction exists for each pair. Only boxes that rise above the table are tested.
     """
-    higher = [box for box in machine.cradle if box.max_mm[2] > 0.0]
+    unturned = Pose(pose.tilt_deg, machine.turn.zero_deg)  # the cradle does not turn with the table
+    higher = [("cradle", unturned, box) for box in machine.cradle if box.max_mm[2] > 0.0]
+    higher += [("plate", pose, box) for box in machine.table.clips]
     if not higher:
         return None
     tried = directions(rotation(machine, pose) @ UP)
     least = (tried @ tips_mm.T).min(axis=1)
-    tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)  # the cradle does not turn with the table
-    for box in higher:
-        reached = corners(box.min_mm, box.max_mm) @ rotation(machine, tilted).T + shift(machine, tilted)
+    for owner, at, box in higher:
+        reached = corners(box.min_mm, box.max_mm) @ rotation(machine, at).T + shift(machine, at)
         reach = (tried @ reached.T).max(axis=1)
         for body in bodies(machine):
             if float((least + body.least(tried) - reach).max()) < body.need_mm:
-                return body.name, box.name
+                return f"the head's {body.name} would meet the {owner}'s {box.name}"
     return None
 
 

@@ -52,12 +52,14 @@ def _inverted(name: str, least_mm: Vector, most_mm: Vector) -> list[str]:
     return [f"box {name}: min_mm must be below max_mm on every axis"] if wrong else []
 
 
-class CradleBox(Frozen):
-    """A body that tilts with the table but does not turn with it: a yoke's arm, a motor, the bearing's plate."""
+class TableBox(Frozen):
+    """A body beside or on the plate: of the cradle, which does not turn (a yoke's arm, a motor), or a clip, which does."""
 
     name: str = Field(description="what it is, for messages")
-    min_mm: Vector = Field(description="least x, y, z from the workpiece origin when level, mm; the plate's surface is z = 0")
-    max_mm: Vector = Field(description="greatest x, y, z from the workpiece origin when level, mm")
+    min_mm: Vector = Field(
+        description="least x, y, z from the workpiece origin when level and unturned, mm; the plate's surface is z = 0"
+    )
+    max_mm: Vector = Field(description="greatest x, y, z from the workpiece origin when level and unturned, mm")
 
     def _problems(self) -> Iterable[str]:
         return _inverted(self.name, self.min_mm, self.max_mm)
@@ -101,6 +103,9 @@ class Table(Frozen):
         None, "x and y of a rectangular plate, mm; its middle is on the turn axis, at turn 0; left out: round"
     )
     thickness_mm: float = rare("Thickness", "build plate", gt=0, le=200)(..., "thickness of the plate, mm")
+    clips: list[TableBox] = rare("Clips", "bed clips binder clip screws magnets disallowed areas excluded area")(
+        [], "what stands on the plate and turns with it: clips, screws; models are placed clear of them"
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -185,7 +190,7 @@ class Machine(Frozen):
         0.025, "greatest deviation of an arc, mm; 0.025 is an eighteenth of a bead"
     )
     table: Table
-    cradle: list[CradleBox] = rare("Bodies that tilt with the table", "collision")([], "bodies that tilt but do not turn")
+    cradle: list[TableBox] = rare("Bodies that tilt with the table", "collision")([], "bodies that tilt but do not turn")
     head: Head
     clearance_mm: float = advanced("Clearance between head and table", "collision distance", ge=0, le=100)(
         1.0, "least distance between head and table, mm"

@@ -17,7 +17,7 @@ from mdp.directions.unit_vectors import spread
 from mdp.head import Body, corners, directions
 from mdp.mesh import Floats
 from mdp.pose import UP, Pose, rotation
-from profiles.machine import CradleBox, Machine, Table
+from profiles.machine import Machine, Table, TableBox
 
 FAR_MM = 1e9
 REFINEMENTS = 40
@@ -40,10 +40,8 @@ def _plate_reach(table: Table, normal: Floats, centre: Floats, tried: Floats) ->
     return reach
 
 
-def _reach_of_cradle(machine: Machine, box: CradleBox, pose: Pose) -> "Reach":
-    """The reach of a body of the cradle, which tilts with the table but does not turn."""
-    tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
-    return partial(_corner_reach, machine_points(machine, tilted, corners(box.min_mm, box.max_mm)))
+def _reach_of_box(machine: Machine, box: TableBox, pose: Pose) -> "Reach":
+    return partial(_corner_reach, machine_points(machine, pose, corners(box.min_mm, box.max_mm)))
 
 
 def _corner_reach(points: Floats, tried: Floats) -> Floats:
@@ -84,9 +82,11 @@ Reach = Callable[[Floats], Floats]  # (k, 3) directions -> (k,) reach of a solid
 
 
 def solids(machine: Machine, pose: Pose, printed: Printed | None = None) -> list[tuple[str, Reach]]:
-    """The solids that the head can meet at a pose: table, cradle bodies, print; with names for messages."""
+    """The solids that the head can meet at a pose: table, clips, cradle bodies, print; with names for messages."""
+    unturned = Pose(pose.tilt_deg, machine.turn.zero_deg)  # the cradle tilts with the table but does not turn
     bodies: list[tuple[str, Reach]] = [("the table", table_reach(machine, pose))]
-    bodies += [(f"the cradle's {box.name}", _reach_of_cradle(machine, box, pose)) for box in machine.cradle]
+    bodies += [(f"the plate's {box.name}", _reach_of_box(machine, box, pose)) for box in machine.table.clips]
+    bodies += [(f"the cradle's {box.name}", _reach_of_box(machine, box, unturned)) for box in machine.cradle]
     if printed is not None and len(printed.points_mm):
         bodies.append(("the print", partial(printed.reach, machine, pose)))
     return bodies
@@ -97,7 +97,7 @@ def swing_mm(machine: Machine, printed: Printed) -> float:
     between = float(np.linalg.norm(np.array(machine.tilt.point_mm) - np.array(machine.turn.point_mm)))
     reach = float(np.hypot(machine.table.radius_mm, machine.table.thickness_mm))
     reach = max(reach, float(np.linalg.norm(printed.points_mm, axis=1).max(initial=0.0)) + printed.bead_mm)
-    for box in machine.cradle:
+    for box in (*machine.table.clips, *machine.cradle):
         reach = max(reach, float(np.linalg.norm(corners(box.min_mm, box.max_mm), axis=1).max()))
     return reach + between
 

@@ -5,7 +5,7 @@ Models of equal size stand in rows and columns, others one by one, the largest f
 finished parts of other models are obstacles like the print beside a limb; all are represented by their convex hulls.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from itertools import product
@@ -13,12 +13,14 @@ from math import ceil, dist, hypot
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from machine.kinematics.table import machine_points
 from machine.planning.limits import ROUNDING, axis_limits, over_edge_mm
 from mdp.clearance import find_obstacle, passes_clear
 from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition, Part
+from mdp.head import Block, bodies
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATE_TOLERANCE_MM
 from mdp.plane import Plane
@@ -74,8 +76,9 @@ def _check_reach(part: Part, profile: Profile) -> None:
 def check_standing(mesh: Mesh, profile: Profile) -> None:
     """Raise MoveError when the base of a model, centred on the turn axis, extends over the plate's edge at its place.
 
-    Brims and supports are not known yet; the dry run checks them.
+    Or when it lies over a clip. Brims and supports are not known yet; the dry run checks them.
     """
+    _check_clips(mesh, profile)
     machine, inset_mm = profile.machine, 0.5 * profile.of_part(1).process.line_width_mm
     standing = mesh.vertices[mesh.vertices[:, 2] <= PLATE_TOLERANCE_MM, :2] + _shift(profile)[:2]
     over, edge = over_edge_mm(np.maximum(np.abs(standing) - inset_mm, 0.0), machine.table)
@@ -86,6 +89,28 @@ def check_standing(mesh: Mesh, profile: Profile) -> None:
             f"the first layer on the plate is {x:.1f} x {y:.1f} mm, {over_mm:.1f} mm over the edge of the plate of "
             f"{machine.name}, {edge}: {_advice(profile)}"
         )
+
+
+def _check_clips(mesh: Mesh, profile: Profile) -> None:
+    """Raise MoveError when a face of the base lies over one of the plate's clips."""
+    corners = mesh.vertices[mesh.faces]
+    low = (corners[:, :, 2] <= PLATE_TOLERANCE_MM).all(axis=1)
+    base = corners[low, :, :2] + _shift(profile)[:2]
+    for clip in profile.machine.table.clips:
+        if _overlaps(base, np.array(list(product(*zip(clip.min_mm[:2], clip.max_mm[:2], strict=True))))):
+            raise MoveError(
+                f"the model would stand on the plate's {clip.name}: {key_name('process.place_mm')} moves it, "
+                f"{key_name('process.scale')} makes it smaller"
+            )
+
+
+def _overlaps(triangles: Floats, rectangle: Floats) -> bool:
+    """Whether any of (n, 3, 2) triangles overlaps the rectangle with (4, 2) corners along the axes: no side separates the two."""
+    sides = np.roll(triangles, -1, axis=1) - triangles
+    normals = np.concatenate([sides[..., ::-1] * (1.0, -1.0), np.broadcast_to(np.eye(2), (len(triangles), 2, 2))], axis=1)
+    own, other = normals @ triangles.transpose(0, 2, 1), normals @ rectangle.T  # (n, 5, 3), (n, 5, 4)
+    apart = (own.min(axis=2) >= other.max(axis=2)) | (own.max(axis=2) <= other.min(axis=2))
+    return bool((~apart.any(axis=1)).any())
 
 
 def _shift(profile: Profile) -> Floats:
@@ -138,6 +163,31 @@ def _plane_moved(plane: Plane, shift: Floats) -> Plane:
     return Plane(plane.normal, plane.offset_mm + float(plane.normal @ shift), limbs_mm)
 
 
+def _is_clear_of_clips(middles_mm: Floats, size_mm: Place, machine: Machine) -> NDArray[np.bool_]:
+    """(...) whether boxes of one size on the level plate, (..., 2) their middles, can be printed without the head or a bead
+    meeting a clip."""
+    clear = np.ones(middles_mm.shape[:-1], np.bool_)
+    for clip in machine.table.clips:
+        for least, most, need_mm in _head_below(machine, clip.max_mm[2]):
+            low, high = middles_mm - 0.5 * np.array(size_mm) + least, middles_mm + 0.5 * np.array(size_mm) + most
+            clear &= ((low >= np.array(clip.max_mm[:2]) + need_mm) | (high <= np.array(clip.min_mm[:2]) - need_mm)).any(axis=-1)
+    return clear
+
+
+def _head_below(machine: Machine, height_mm: float) -> Iterator[tuple[Floats, Floats, float]]:
+    """Least and greatest x, y of each body of the head that may come near a height while the tip is on the plate, relative to the
+    tip, and the distance that it keeps; first the tip itself."""
+    yield np.full(2, -EDGE_MM), np.full(2, EDGE_MM), 0.0
+    for body in bodies(machine):
+        if isinstance(body, Block):
+            if body.min_mm[2] < height_mm + body.need_mm:
+                yield np.array(body.min_mm[:2]), np.array(body.max_mm[:2]), body.need_mm
+        elif (
+            radius := max((radius for radius, low_mm in body.discs_mm if low_mm < height_mm + body.need_mm), default=0.0)
+        ) > 0.0:
+            yield np.full(2, -radius), np.full(2, radius), body.need_mm
+
+
 class Misfit(NamedTuple):
     """The index of the box without a place; the number already placed; whether it would fit but for the head."""
 
@@ -160,7 +210,7 @@ def places_on_plate(size_mm: Place, gap_mm: float, count: int, machine: Machine,
             axes.append([(k + part) * (side + gap_mm) for k in range(-most, most + 1)])
         middles = np.array(list(product(*axes))) + np.array(anchor_mm)
         over_mm, _ = over_edge_mm(np.abs(middles) + 0.5 * np.array(size_mm) + EDGE_MM, machine.table)
-        inside = ((x, y) for x, y in middles[over_mm <= 0.0].tolist())
+        inside = ((x, y) for x, y in middles[(over_mm <= 0.0) & _is_clear_of_clips(middles, size_mm, machine)].tolist())
         lattices.append(sorted(inside, key=lambda place: (round(dist(place, about_mm), 6), place[1], place[0]))[:count])
     return max(lattices, key=lambda places: (len(places), -max((dist(place, about_mm) for place in places), default=0.0)))
 
@@ -202,7 +252,9 @@ class Plate:
         # move all together so that their bounding box is centred at their place, if they stay on the plate
         middles, halves = np.array(found), 0.5 * np.array(sizes_mm)
         moved = middles + np.array(about_mm) - 0.5 * ((middles - halves).min(axis=0) + (middles + halves).max(axis=0))
-        if (over_edge_mm(np.abs(moved) + halves + EDGE_MM, self._machine.table)[0] > ROUNDING_MM).any():
+        over_mm, _ = over_edge_mm(np.abs(moved) + halves + EDGE_MM, self._machine.table)
+        clear = [_is_clear_of_clips(place, size_mm, self._machine) for place, size_mm in zip(moved, sizes_mm, strict=True)]
+        if (over_mm > ROUNDING_MM).any() or not all(clear):
             return found
         together: list[Place] = [(x, y) for x, y in moved.tolist()]
         return together if self.is_clear(dict(enumerate(together))) else found
@@ -227,7 +279,8 @@ class Plate:
         lattice = np.arange(-ceil(reach_mm / STEP_MM), ceil(reach_mm / STEP_MM) + 1) * STEP_MM
         columns, rows = (np.unique(np.concatenate([beside[:, axis], lattice, [near_mm[axis]]])) for axis in (0, 1))
         places = np.stack(np.meshgrid(columns, rows), axis=-1).reshape(-1, 2)
-        places = places[over_edge_mm(np.abs(places) + 0.5 * size + EDGE_MM, self._machine.table)[0] <= ROUNDING_MM]
+        over_mm, _ = over_edge_mm(np.abs(places) + 0.5 * size + EDGE_MM, self._machine.table)
+        places = places[(over_mm <= ROUNDING_MM) & _is_clear_of_clips(places, self._sizes_mm[number], self._machine)]
         for (middle, _), least in zip(boxes, apart, strict=True):
             places = places[(np.abs(places - middle) >= least - ROUNDING_MM).any(axis=1)]
         away = np.round(np.hypot(*(places - np.array(near_mm)).T), 6)

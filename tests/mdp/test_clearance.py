@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mdp.clearance import allowed_poses
+from mdp.clearance import allowed_poses, find_obstacle
 from mdp.head import Block, Body, bodies, corners
 from mdp.mesh import Floats
 from mdp.pose import Pose, rotation, shift, unit
-from profiles.machine import CradleBox, Machine
+from profiles.machine import Machine, TableBox
 from profiles.profile import load
 
 MACHINE = load(settings=["machine.clearance_mm=0"]).machine
@@ -20,8 +20,14 @@ LEANING = unit((0.0, -0.6, 0.8))
 
 def with_post(machine: Machine, y_mm: float, height_mm: float) -> Machine:
     """The machine with a post of the cradle 20 mm wide beside the table."""
-    post = CradleBox(name="post", min_mm=(-10.0, y_mm, -20.0), max_mm=(10.0, y_mm + 8.0, height_mm))
+    post = TableBox(name="post", min_mm=(-10.0, y_mm, -20.0), max_mm=(10.0, y_mm + 8.0, height_mm))
     return machine.model_copy(update={"cradle": [post]})
+
+
+def with_clip(y_mm: float, height_mm: float) -> Machine:
+    """The machine without a cradle but with a clip 20 mm wide on its plate."""
+    clip = TableBox(name="clip", min_mm=(-10.0, y_mm, 0.0), max_mm=(10.0, y_mm + 8.0, height_mm))
+    return MACHINE.model_copy(update={"cradle": [], "table": MACHINE.table.model_copy(update={"clips": [clip]})})
 
 
 def outline(body: Body) -> Floats:
@@ -34,10 +40,10 @@ def outline(body: Body) -> Floats:
 
 
 def meet(machine: Machine, pose: Pose) -> bool:
-    """Whether a body of the head, over all places of the tip, shares room with the post; by exact solids."""
+    """Whether a body of the head, over all places of the tip, shares room with the post or clip; by exact solids."""
     tips = PART @ rotation(machine, pose).T + shift(machine, pose)
-    tilted = Pose(pose.tilt_deg, machine.turn.zero_deg)
-    box = machine.cradle[0]
+    tilted = Pose(pose.tilt_deg, machine.turn.zero_deg) if machine.cradle else pose
+    (box,) = machine.cradle or machine.table.clips
     post = corners(box.min_mm, box.max_mm) @ rotation(machine, tilted).T + shift(machine, tilted)
     swept = [(tips[:, None] + outline(body)[None]).reshape(-1, 3) for body in bodies(machine)]
     return any((m3.Manifold.hull_points(hull) ^ m3.Manifold.hull_points(post)).volume() > 1e-6 for hull in swept)
@@ -47,6 +53,18 @@ def meet(machine: Machine, pose: Pose) -> bool:
 def test_no_pose_is_allowed_at_which_the_head_meets_a_post_of_the_cradle(y_mm: float, height_mm: float) -> None:
     machine = with_post(MACHINE, y_mm, height_mm)
     assert not any(meet(machine, pose) for pose in allowed_poses(machine, LEANING, PART))
+
+
+@given(st.floats(-100, 92), st.floats(2, 60))
+def test_no_pose_is_allowed_at_which_the_head_meets_a_clip_that_turns_with_the_plate(y_mm: float, height_mm: float) -> None:
+    machine = with_clip(y_mm, height_mm)
+    assert not any(meet(machine, pose) for pose in allowed_poses(machine, LEANING, PART))
+
+
+def test_a_low_clip_far_out_leaves_both_poses_and_one_beside_the_part_is_named() -> None:
+    assert len(allowed_poses(with_clip(80.0, 6.0), LEANING, PART)) == 2
+    reason = find_obstacle(with_clip(10.0, 40.0), Pose(0.0, 0.0), PART)
+    assert reason == "the head's hot end would meet the plate's clip"
 
 
 def test_the_post_beside_the_part_would_be_met_at_every_pose() -> None:
@@ -63,6 +81,6 @@ def test_a_low_post_far_out_leaves_both_poses_and_a_tall_one_beside_the_part_non
 
 
 def test_what_lies_under_the_table_changes_nothing() -> None:
-    under = MACHINE.model_copy(update={"cradle": [CradleBox(name="arm", min_mm=(-10, 60, -40), max_mm=(10, 80, -1))]})
+    under = MACHINE.model_copy(update={"cradle": [TableBox(name="arm", min_mm=(-10, 60, -40), max_mm=(10, 80, -1))]})
     assert allowed_poses(under, LEANING, PART) == allowed_poses(MACHINE, LEANING, PART)
     assert np.isfinite([pose.turn_deg for pose in allowed_poses(under, LEANING, PART)]).all()

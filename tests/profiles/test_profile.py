@@ -114,7 +114,7 @@ def test_a_share_is_also_read_as_a_percentage() -> None:
             "machine.head.silhouette_mm: [1, 3] follows [2, 0]: radii must rise and heights must not fall",
         ),
         ("machine.head.silhouette_mm=[]", "machine.head.silhouette_mm is []: it must be a list of one or more pairs of numbers"),
-        ("machine.table=5", "machine.table is 5: it must be a table with the keys radius_mm, size_mm, thickness_mm"),
+        ("machine.table=5", "machine.table is 5: it must be a table with the keys radius_mm, size_mm, thickness_mm, clips"),
         (
             "machine.tilt.limits_deg=[-0.5,0.25]",
             "machine.tilt.limits_deg is [-0.5, 0.25]: the table would lean by at most 0.5 deg, at least 1 is needed; "
@@ -131,6 +131,10 @@ def test_a_share_is_also_read_as_a_percentage() -> None:
             'machine.cradle=[{name="arm",min_mm=[90,-9,-40],max_mm=[120,9,1]}]',
             "machine.cradle: box arm reaches z 1 mm within 90 mm of the turn axis: there the plate turns "
             "(radius 100 mm, 4 mm thick)",
+        ),
+        (
+            'machine.table.clips=[{name="clip",min_mm=[5,80,0],max_mm=[-5,90,6]}]',
+            "machine.table.clips.0: box clip: min_mm must be below max_mm on every axis",
         ),
         (
             'machine.head.boxes=[{name="fan",min_mm=[0,0,-1],max_mm=[1,1,1]}]',

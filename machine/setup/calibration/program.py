@@ -206,6 +206,9 @@ def safe_z_mm(machine: Machine, mark: tuple[float, float, float], tilt_deg: floa
     ring = np.column_stack([np.cos(around), np.sin(around), np.zeros(24)])
     solid = [ring * machine.table.radius_mm, ring * mark[0] + np.array([0.0, 0.0, mark[2]])]
     solid += [corners(box.min_mm, box.max_mm) for box in machine.cradle]
+    for clip in machine.table.clips:
+        away = np.linalg.norm(corners(clip.min_mm, clip.max_mm)[:, :2], axis=1).max()
+        solid.append(ring * away + np.array([0.0, 0.0, clip.max_mm[2]]))
     steps = np.append(np.arange(-tilt_deg, tilt_deg, 2.0), tilt_deg)
     zero = machine.turn.zero_deg
     points = np.vstack(solid)

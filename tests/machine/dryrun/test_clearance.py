@@ -11,7 +11,7 @@ from machine.kinematics.table import machine_points
 from mdp.directions.unit_vectors import spread
 from mdp.head import Block, Ring, bodies, directions
 from mdp.pose import UP, Pose, rotation
-from profiles.machine import Box, Head, Machine
+from profiles.machine import Box, Head, Machine, TableBox
 from profiles.profile import Profile, load
 
 GENERIC = load()
@@ -135,3 +135,25 @@ def test_a_tip_that_rises_from_where_it_was_homed_meets_no_plate_that_was_measur
     assert [f for f in dry_run(lines, higher).findings if f.severity == "error"] == []
     low = [*lines, "G1 Z0.2 F600"]
     assert [f.code for f in dry_run(low, higher).findings if f.severity == "error"] == ["collision"]
+
+
+@pytest.mark.parametrize(("turn", "is_met"), [(0, True), (180, False)])
+def test_the_head_is_checked_against_a_clip_where_the_plate_has_turned_it(turn: int, is_met: bool) -> None:
+    clip = TableBox(name="clip", min_mm=(30.0, -10.0, 0.0), max_mm=(40.0, 10.0, 8.0))
+    table = GENERIC.machine.table.model_copy(update={"clips": [clip]})
+    machine = GENERIC.machine.model_copy(update={"table": table, "uncalibrated": []})
+    profile = GENERIC.model_copy(update={"machine": machine})
+    lines = [
+        "G21",
+        "G90",
+        "M83",
+        "G28 X Y Z",
+        "G92 A0 C0",
+        "G1 Z40 F900",
+        f"G1 C{turn} F900",
+        "G1 X50 Y0 F3000",
+        "G1 Z10 F900",
+        "G1 Z3 F900",
+    ]
+    found = [finding.message for finding in dry_run(lines, profile).findings if finding.code == "collision"]
+    assert [message.split(" at ")[0] for message in found] == ["hot end runs into the plate's clip"] * is_met

@@ -24,6 +24,7 @@ from mdp.topology.components import vertex_components
 from mdp.topology.cross_section import cross_sections
 from mdp.zone import Grown, Marked, MeshVolume, Modifier, Zone
 from profiles.errors import MoveError, PlanError
+from profiles.machine import TableBox
 from profiles.part_settings import PartSettings
 from profiles.profile import Profile, load, with_part_settings
 from slicer.geometry.polygons import of_contours
@@ -70,6 +71,17 @@ def test_copies_on_a_round_plate_keep_to_its_edge_and_apart() -> None:
     assert len(boxes) > 20
     assert all(disc.covers(box.buffer(2.0, join_style="mitre")) for box in boxes)
     assert min(a.distance(b) for a, b in combinations(boxes, 2)) == pytest.approx(5.0)
+
+
+def test_copies_stand_where_the_head_that_prints_them_stays_clear_of_a_clip() -> None:
+    machine = load(settings=["machine.head.silhouette_mm=[[0.6, 0], [8, 5], [20, 30]]", "machine.head.boxes=[]"]).machine
+    clip = TableBox(name="clip", min_mm=(-20.0, -90.0, 0.0), max_mm=(20.0, -30.0, 12.0))
+    clipped = machine.model_copy(update={"table": machine.table.model_copy(update={"clips": [clip]})})
+    free, kept = (places_on_plate((20.0, 20.0), 5.0, 1000, of) for of in (machine, clipped))
+    near = shapely.box(-20.0, -90.0, 20.0, -30.0).buffer(8.0 + machine.clearance_mm, join_style="mitre")  # 20 mm lie at 30 mm
+    assert any(near.intersects(shapely.box(x - 10, y - 10, x + 10, y + 10)) for x, y in free)
+    assert not any(near.buffer(-1e-6).intersects(shapely.box(x - 10, y - 10, x + 10, y + 10)) for x, y in kept)
+    assert len(kept) > 0.6 * len(free)
 
 
 def test_every_copy_has_the_settings_of_its_modifiers() -> None:

@@ -1,5 +1,6 @@
 """Fit: what a machine has no room for is refused before it is sliced."""
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from machine.planning.fit import check_parts
 from mdp.search.parts import one_piece
 from profiles.errors import MoveError
+from profiles.machine import TableBox
 from profiles.profile import load
 from tests.machine.hand import post_and_arm
 from tests.shapes import box
@@ -43,3 +45,14 @@ def test_a_model_that_stands_over_the_plates_edge_is_refused_before_it_is_sliced
     with pytest.raises(MoveError, match=message):
         check_parts([one_piece(box(150, 150, 2), profile.machine)], profile)
     check_parts([one_piece(box(141, 141, 2), profile.machine)], profile)
+
+
+@pytest.mark.parametrize(("place", "is_refused"), [("[0, 0]", False), ("[0, -40]", True), ("[52, -40]", False)])
+def test_a_model_that_stands_on_a_clip_is_refused_before_it_is_sliced(place: str, is_refused: bool) -> None:
+    profile = load(settings=[f"process.place_mm={place}"])
+    clip = TableBox(name="front clip", min_mm=(-30.0, -95.0, 0.0), max_mm=(30.0, -55.0, 6.0))
+    table = profile.machine.table.model_copy(update={"clips": [clip]})
+    clipped = profile.model_copy(update={"machine": profile.machine.model_copy(update={"table": table})})
+    refused = pytest.raises(MoveError, match=r"the model would stand on the plate's front clip: .*place_mm.* moves it")
+    with refused if is_refused else nullcontext():
+        check_parts([one_piece(box(40, 40, 10), clipped.machine)], clipped)

@@ -14,7 +14,7 @@ from machine.planning.stand import Turn, least_z, poses_between, route, stands, 
 from mdp.head import bodies, corners
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
-from profiles.machine import CradleBox, Machine
+from profiles.machine import Machine, TableBox
 from profiles.profile import load
 from slicer.estimate.timing import speeds_of
 
@@ -22,7 +22,7 @@ SPEEDS = speeds_of(load())._replace(lift_mm_s=10.0, travel_mm_s=150.0)
 PRINT = corners((-20.0, -15.0, 0.0), (20.0, 15.0, 50.0))
 AT, TARGET = np.array([10.0, 5.0, 50.2]), np.array([0.0, -40.0, 30.0])
 TURN = Pose(60.0, 50.0)
-YOKE = CradleBox(name="yoke", min_mm=(-130.0, -20.0, -40.0), max_mm=(-110.0, 20.0, 60.0))
+YOKE = TableBox(name="yoke", min_mm=(-130.0, -20.0, -40.0), max_mm=(-110.0, 20.0, 60.0))
 
 
 def _machine(name: str) -> Machine:

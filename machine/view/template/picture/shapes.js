@@ -159,16 +159,17 @@ export function bodiesOf(machine, dark) {
   const plate = dark ? [66, 72, 81, 255] : [232, 235, 239, 255], frame = dark ? [112, 121, 134, 255] : [190, 196, 205, 255];
   const line = dark ? [120, 128, 140, 110] : [120, 126, 136, 120], edge = dark ? [170, 178, 190, 190] : [70, 76, 86, 170];
   return {
-    table: { solid: trianglesOf([{ corners: plateCorners(machine.table), colour: plate }]), lines: trianglesOf(plateLines(machine.table, line, edge)) },
+    table: boxesOf(machine.table.clips, frame, edge, [{ corners: plateCorners(machine.table), colour: plate }], plateLines(machine.table, line, edge)),
     cradle: boxesOf(machine.cradle, frame, edge),
     ...headOf(machine.head, frame, edge),
   };
 }
 
-export function boxesOf(boxes, colour, edge) {
+/** Boxes, and what is drawn with them: solids, and lines. */
+export function boxesOf(boxes, colour, edge, solids = [], lines = []) {
   return {
-    solid: trianglesOf(boxes.map((box) => ({ corners: boxCorners(box.min_mm, box.max_mm), colour }))),
-    lines: trianglesOf(boxes.map((box) => ({ corners: boxEdges(box.min_mm, box.max_mm), colour: edge }))),
+    solid: trianglesOf([...solids, ...boxes.map((box) => ({ corners: boxCorners(box.min_mm, box.max_mm), colour }))]),
+    lines: trianglesOf([...lines, ...boxes.map((box) => ({ corners: boxEdges(box.min_mm, box.max_mm), colour: edge }))]),
   };
 }
 
