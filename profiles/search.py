@@ -21,7 +21,7 @@ class Search(Frozen):
     """How the parts are searched."""
 
     directions: int = advanced("Directions tried", "orientations samples", ge=1, le=100000)(
-        600, "directions sampled on the sphere"
+        600, "directions spread over the sphere above the least angle"
     )
     least_elevation_deg: float = rare("Least angle of a direction", ge=0, le=89)(
         10.0, "least angle of a direction above the build plate, deg"
