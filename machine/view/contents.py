@@ -8,6 +8,12 @@ keys of the profile with unit axes, known false for a guess; front: the rows of 
 unit]] and the bases of parts 2, 3, ... (a point belongs to the last part whose plane it is above, else to part 1); findings, row
 -1 for the whole print; report: facts and tables, all texts.
 null: unknown.
+
+Motion of the machine. T(value) and U(value) are right-handed rotations about `tilt.axis` and `turn.axis` by -sign * (value -
+zero_deg). With tilt a, turn c and points in mm of the machine frame, the nozzle's tip is at XYZ - tool_mm, a workpiece point w at
+T(a) (U(c) w + turn.point_mm - tilt.point_mm) + tilt.point_mm, a point q of the cradle at T(a) (q + turn.point_mm - tilt.point_mm)
++ tilt.point_mm. The plate is z = 0 of the workpiece frame. The silhouette is revolved about the nozzle; boxes
+are relative to the tip.
 """
 
 from collections.abc import Sequence

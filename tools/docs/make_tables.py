@@ -16,6 +16,7 @@ from tools.docs.harness import DOCS, marked
 KEYS, STATES = DOCS / "keys.md", DOCS / "states.mmd"
 AXIS = re.compile(r"(?<=^machine)\.(x|y|z|tilt|turn)\.")
 UNIT = re.compile(r", (°C|N|s|deg|g/cm³|mm²|mm|MPa)(/s²|/s)?$|, mm³/s$")
+EMPTY = ("", "null", '""', "[]", "{}")  # defaults that are none
 FILLERS = frozenset(["a", "an", "at", "by", "for", "in", "its", "of", "on", "or", "the", "to"])
 
 
@@ -30,7 +31,7 @@ def table(section: str) -> str:
         rows[stem, meaning, "" if stem != key else shown].append(key)
     lines = ["| key | meaning | default |", "|---|---|---|"]
     for (_, meaning, shown), names in rows.items():
-        default = f"`{shown}`" if shown and shown != "null" else ""
+        default = f"`{shown}`" if shown not in EMPTY else ""
         lines.append(f"| {_joined(names)} | {meaning} | {default} |")
     return "\n".join(lines) + "\n"
 
