@@ -59,6 +59,8 @@ WORDS = {
     r"\bdoes not tell\b": "does not say, state or report",
 }
 
+PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "tools/RESULTS.md")] + sorted((ROOT / "docs").glob("*.md"))
+BEGINNING = re.compile(r"(^|[.:|] |\*\*|^[-*] )(Of|What|Whose|The same) ")  # of a sentence, a cell or a bold text
 CODE = re.compile(r"`[^`]*`|\w+(?:/\w+)*\.cpp")  # names are checked where they are defined
 
 
@@ -106,6 +108,12 @@ def test_docstrings_and_comments_use_the_words_of_the_glossary(package: str) -> 
 )
 def test_the_check_finds_words_in_docstrings_and_comments_only(source: str, count: int) -> None:
     assert len(findings(source)) == count
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_no_sentence_of_a_page_begins_with_of_what_whose_or_the_same(page: Path) -> None:
+    lines = [line for line in page.read_text(encoding="utf-8").splitlines() if not line.startswith("#")]
+    assert [line for line in lines if BEGINNING.search(line)] == []
 
 
 def test_the_glossary_has_one_line_for_each_of_its_terms_in_alphabetical_order() -> None:
