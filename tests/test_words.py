@@ -60,7 +60,7 @@ WORDS = {
 }
 
 PAGES = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "tools/RESULTS.md")] + sorted((ROOT / "docs").glob("*.md"))
-BEGINNING = re.compile(r"(^|[.:|] |\*\*|^[-*] )(Of|What|Whose|The same) ")  # of a sentence, a cell or a bold text
+BEGINNING = re.compile(r"(^|[.:|] |\*\* ?|^[-*] )(Of|What|Whose|The same) ")  # of a sentence, a cell or a bold text
 CODE = re.compile(r"`[^`]*`|\w+(?:/\w+)*\.cpp")  # names are checked where they are defined
 
 

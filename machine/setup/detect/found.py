@@ -113,7 +113,7 @@ def has_box(kinematics: str, source: str) -> bool:
     if kinematics not in KINEMATICS:
         raise ProfileError(
             f"{source} is {kinematics!r}: how that moves X, Y, Z, tilt and turn is not known here; copy the nearest profile and "
-            "write machine.tilt and machine.turn yourself (docs/machines.md, Write the profile a machine)"
+            "write machine.tilt and machine.turn yourself (docs/machines.md, Write the profile yourself)"
         )
     return KINEMATICS[kinematics]
 
