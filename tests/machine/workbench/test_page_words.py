@@ -30,7 +30,7 @@ PAIRS = [
     (f"{advice('filament-change', '1:x')}: PART:LAYER or", "1:x under Copies and pauses: PART:LAYER or"),
     (f"give them up, {advice('set', 'process.scale=25.4', 'give')}", "give them up, set Scale of the model to 25.4"),
     (f"{option('set', 'process.walls=4')} and", "Walls = 4 and"),
-    (f"X (lists all, {FORCE_GOES_ON})", "X (lists all, tick Go on anyway to print it)"),
+    (f"X (lists all, {FORCE_GOES_ON})", "X (lists all, tick Continue anyway to print it)"),
     (f"{key_name('machine.tilt.limits_deg')} is [5, 3]", "Tilt axis: Range is [5, 3]"),
     (f"{key_name('machine.gcode.end')}: placeholder {{nozzle_c}}", "G-code blocks: End G-code: placeholder {nozzle_c}"),
     (f"at most 0.9 of {key_name('process.line_width_mm', 'line_width_mm')}", "at most 0.9 of Line width"),
