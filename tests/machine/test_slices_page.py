@@ -185,7 +185,7 @@ def test_figures_of_the_slices_before_are_not_shown_while_it_is_sliced_again(bro
     seen = f"if (state.slicing && state.sliced) window.seen = {look}"
     browser.value(f"modules['page/store'].subscribe(({{ state }}) => {{ {seen}; }})")
     with bench.line() as page:
-        page.do("set", key="process.layer_height_mm", value="0.3")
+        page.do("set", key="process.brim_mm", value="5")
     browser.wait("document.body.classList.contains('stale')")
     slice_it(browser)
     assert browser.value("window.seen") == ["print time…filament…", False, False]
