@@ -32,6 +32,7 @@ PAIRS = [
     (f"{option('set', 'process.walls=4')} and", "Walls = 4 and"),
     (f"X (lists all, {FORCE_GOES_ON})", "X (lists all, tick Continue anyway to print it)"),
     (f"{key_name('machine.tilt.limits_deg')} is [5, 3]", "Tilt axis: Range is [5, 3]"),
+    (f"a guess: {key_name('machine.table')}", "a guess: Table"),
     (f"{key_name('machine.gcode.end')}: placeholder {{nozzle_c}}", "G-code blocks: End G-code: placeholder {nozzle_c}"),
     (f"at most 0.9 of {key_name('process.line_width_mm', 'line_width_mm')}", "at most 0.9 of Line width"),
     (f"{option('parts', 9)}: the search found no more than 3", "the number of parts 9: the search found no more than 3"),
