@@ -161,6 +161,10 @@ class PlaneTrials:
         """Apply planes if they can be cut. nearer: command that places the plane at the nearest position. Raises PlanError
         otherwise."""
         bench, cuts, self.refused = self._session.bench, edit.cuts, None
+        if len(cuts) + 1 < bench.parts and not self.invalid.keys() <= set(cuts):  # an invalid plane goes even if others need it
+            after = with_cuts(bench, cuts)
+            self._session.do(edit.word, after, await self.recheck(after))
+            return
         aside: Invalid = {}
         trial = await self.attempt(bench, cuts)
         if trial.rejected:

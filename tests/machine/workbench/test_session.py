@@ -400,6 +400,30 @@ def test_at_another_place_planes_that_the_machine_does_not_reach_stay_as_invalid
     assert (session.bench.parts, session.bench.profile.process.place_mm) == (3, (30.0, 0.0))
 
 
+def test_an_invalid_plane_is_removed_even_if_another_one_is_invalid_without_it() -> None:
+    low, high = PlannedPart(UP, 5.0), PlannedPart(UP, 25.0)
+
+    async def work(session: Session) -> None:
+        async def answer(task: Any, *given: Any, **more: Any) -> Any:
+            if task.__name__ != "try_cuts":
+                return Standing((40.0, 8.0, 40.0), 0.0, "") if task.__name__ == "stand" else None
+            cuts, aside = given[2], given[4]
+            if high in cuts:
+                return Trial(()) if high in aside else Trial((), 3, "it is marked")
+            return Trial(()) if low in aside else Trial((), 2, "a sliver stays")
+
+        session.hand.run = answer  # type: ignore[method-assign]
+        session.do("cut", replace(session.bench, cuts=(low, high)))
+        await settled(session)
+        assert session.trials.invalid == {high: "it is marked"}
+        obey(session, {"do": "remove", "part": 3})
+        await settled(session)
+
+    session = when_done(work)
+    assert (session.bench.cuts, session.problem) == ((low,), "")
+    assert session.note == "part 2 cannot be cut off: a sliver stays"
+
+
 def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is_done() -> None:
     told = []
 
