@@ -412,3 +412,17 @@ def test_a_number_below_the_slider_is_taken_by_a_click_and_its_costs_are_told_be
         page.until(lambda state: state["parts"] == row["parts"])
         less = round(100 * (1 - row["support_area_mm2"] / one["support_area_mm2"]))
         browser.wait(f"$('front-told').textContent.includes('against 1 part−{less} % support, ')")
+
+
+def test_earlier_work_is_opened_with_a_plane_that_its_mark_forbids(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 20.0, 35.0)
+        page.do("mark", kind="keep", min_mm=[-2, -2, 33], max_mm=[2, 2, 37])
+        page.until(lambda state: state["note"])
+        opened(page, bench, "glass.stl")
+        work = json.loads(bench.ask("kept")[1])[0]
+        assert work["name"] == "tee.stl"
+        assert bench.ask(f"kept/{work['key']}", "POST", b"", Origin=f"http://127.0.0.1:{bench.port}")[0] == 200
+        state = page.until(lambda state: state["model"]["name"] == "tee.stl" and any(state["invalid"]))
+        assert state["invalid"] == ["", "its plane would pass through protected area 1"]

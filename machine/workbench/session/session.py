@@ -48,7 +48,7 @@ from mdp.search.plan_file import PlanFile, planned_parts
 from mdp.search.plan_reading import read_plan
 from mdp.zone import NO_ZONES
 from profiles.effect import effect_of_change
-from profiles.errors import MeshError, PlanError
+from profiles.errors import MeshError, PlanError, UserError
 from profiles.frozen import Effect
 from profiles.profile import Profile
 
@@ -257,8 +257,11 @@ class Session(SessionBase):
             if plan is not None:
                 marks = NO_ZONES if project.marks_in_plan else bench.zones
                 rows: tuple[FrontRow, ...] = ()
-                with suppress(PlanError):  # its planes were invalid when it was saved
+                try:
                     rows = await self.quick.run(measure_plan, uncut, plan)
+                except UserError:
+                    if not await self.trials.find_invalid(with_plan(uncut, plan, (), profile)):
+                        raise  # else they were invalid when it was saved
                 bench = with_rotation(with_plan(uncut, plan, rows, with_plan_settings(profile, plan)), project.rotation)
                 bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
         bench = bench if project.parts else replace(bench, cuts=None)
@@ -294,9 +297,11 @@ class Session(SessionBase):
             return await self.quick.run(task, self.bench, *given)
 
     async def _draw_pieces(self, bench: Bench) -> Path:
-        """The parts as separate bodies, packed by `work.pieces`. Raises UserError if they cannot be cut."""
+        """The parts as separate bodies, packed by `work.pieces`; an empty file if they cannot be cut, which the trials tell."""
         out, before = self.new_file(), self.pieces.done
-        await self.quick.run(draw_pieces, bench, out)
+        out.touch()
+        with suppress(UserError):
+            await self.quick.run(draw_pieces, bench, out)
         if before is not None and not self.pieces.stale:
             before.unlink(missing_ok=True)
         return out

@@ -359,7 +359,9 @@ def test_another_machine_keeps_all_planes_and_tells_which_it_cannot_cut(bench: R
         page.do("profile", kind="machine", name="three_axis")
         kept = page.until(lambda state: state["given"]["machine"] == "three_axis" and state["note"])
         assert ([cut["offset_mm"] for cut in kept["cuts"]], kept["problem"]) == ([20.0, 8.0], "")
-        assert (kept["invalid"][0], kept["note"]) == ("", f"part 3 cannot be cut off: {kept['invalid'][1]}")
+        assert bench.ask("pieces") == (204, b"")
+        assert (page.state["problem"], kept["invalid"][0]) == ("", "")
+        assert kept["note"] == f"part 3 cannot be cut off: {kept['invalid'][1]}"
         page.do("undo")
         page.until(lambda state: state["parts"] == 3 and state["given"]["machine"] == "generic_ac")
         page.do("set", key="process.scale", value="2")
