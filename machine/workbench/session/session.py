@@ -297,7 +297,7 @@ class Session(SessionBase):
             return await self.quick.run(task, self.bench, *given)
 
     async def _draw_pieces(self, bench: Bench) -> Path:
-        """The parts as separate bodies, packed by `work.pieces`; an empty file if they cannot be cut, which the trials tell."""
+        """The parts as separate bodies, packed by `work.pieces`; an empty file if they cannot be cut, as the trials report."""
         out, before = self.new_file(), self.pieces.done
         out.touch()
         with suppress(UserError):
