@@ -32,6 +32,7 @@ PHRASES = {
     "another baud rate": "try another baud rate",
     "another plate": "choose another one below",
     "compiling": "getting ready (first run only)",
+    "cut by hand": "to cut it all the same, add a plane under Parts and move it where you like",
     "for all": "set it for all parts",
     "force": "tick Continue anyway to print it",
     "found by the search": "leave the part out of the plan and use Find the others",

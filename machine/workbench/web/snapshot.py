@@ -167,6 +167,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "busy": session.busy,
         "note": session.note,
         "preparing": bool(session.readiness.progress),
+        "unsliceable": _unsliceable(session),
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "savable": _savable(session),
         **_steps(session.history),
@@ -183,6 +184,14 @@ def snapshot(session: Session) -> dict[str, Any]:
         "benches": session.benches,
         "kept": session.keeping.released,
     }
+
+
+def _unsliceable(session: Session) -> str:
+    """Why what is on the bench cannot be sliced, as far as it is known; "" if it can."""
+    bench, standing = session.bench, session.standing.result
+    if (invalid := session.trials.unsliceable()) or standing is None:
+        return invalid
+    return standing.copies_problem or ("" if bench.cuts else standing.problem)
 
 
 def _steps(history: History) -> dict[str, Any]:
@@ -226,6 +235,7 @@ def _parts_state(session: Session) -> dict[str, Any]:
         "recommended": bench.recommended,
         "cuts": _cuts(bench.cuts or ()),
         "locked": [part in bench.locked for part in bench.cuts or ()],
+        "invalid": [session.trials.invalid.get(part, "") for part in bench.cuts or ()],
         "trial": _trial(session),
         "refused": _refused(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),

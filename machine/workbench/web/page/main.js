@@ -83,7 +83,7 @@ const onlyWithLine = (open) => document.querySelectorAll("fieldset:is(.linked, :
 function problemLine() {
   onState(({ problem, refused, units }) => {
     putNew($("problem"), problem, () => withWholeOptions(problem)); // read aloud once
-    hide({ problem: !problem, "put-near": !refused?.near, "put-aside": !refused });
+    hide({ problem: !problem, "put-aside": !refused });
     putNew($("units"), units?.words || [], () => (units?.words || []).map((unit) => button(`in ${unit}`, () => send({ do: "unit", unit }))));
   });
 }
