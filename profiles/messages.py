@@ -46,6 +46,11 @@ def settings_in(message: str) -> list[str]:
     return [value for name, value, _ in _MARK.findall(message) if name.endswith("--set")]
 
 
+def keys_in(message: str) -> list[str]:
+    """The keys of the profile that a message names."""
+    return [name for name, value, _ in _MARK.findall(message) if "." in name and not value]
+
+
 def terminal_words(message: str) -> str:
     """The message as a terminal shows it."""
     return rendered(message, lambda name, value, terminal: terminal)

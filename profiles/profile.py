@@ -11,7 +11,7 @@ from profiles.errors import ProfileError
 from profiles.frozen import TITLES, Frozen
 from profiles.machine import Machine
 from profiles.material import Material
-from profiles.messages import option
+from profiles.messages import option, rendered
 from profiles.part_settings import PartSettings, merge_part_settings, process_of_part
 from profiles.places import (
     KINDS,
@@ -176,14 +176,20 @@ def rows(prefix: str, model: Frozen) -> Iterator[tuple[str, Any, str]]:
 
 @cache
 def labels() -> dict[str, str]:
-    """The label of every key."""
-    return {key: field.title or "" for section, model in SECTIONS.items() for key, field in keys(model, f"{section}.")}
+    """The label of every key, and of every table of keys."""
+    named = {key: field.title or "" for section, model in SECTIONS.items() for key, field in keys(model, f"{section}.")}
+    return {key: title for key, title in TITLES.items() if "." in key} | named
 
 
 def label_of(key: str) -> str:
     """The label of a key, with the title of its table where it is nested; an unknown key itself."""
     label, table = labels().get(key), key.rpartition(".")[0]
     return key if label is None else f"{TITLES[table]}: {label}" if table.count(".") else label
+
+
+def with_labels(message: str) -> str:
+    """A message with the labels of its keys; options are those of the terminal."""
+    return rendered(message, lambda name, value, terminal: label_of(name) if name in labels() else terminal)
 
 
 def _apply(whole: dict[str, Any], setting: str) -> None:

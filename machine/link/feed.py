@@ -6,13 +6,14 @@ from dataclasses import replace
 from math import inf
 
 from machine.firmware import dialect_of
+from machine.gcode.commands import command_in
 from machine.gcode.modes import ModalState, axes_of
 from machine.gcode.words import PAUSE_REMARK, split_command
 from machine.link.exchange import Exchange
 from machine.link.journal import Checkpoint, Journal
 from machine.link.line_history import Barriers, LineHistory, PlannerReports, SentLine, shifts
 from machine.link.pause.park_moves import lift_move
-from machine.link.pause.pause import Pause
+from machine.link.pause.pause import COLD_C, NEAR_C, Pause
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
 from machine.link.print_state import PrintState, PrintStatus, ProgramPosition
@@ -166,7 +167,17 @@ class Feed:
             self._rest(f"the program pauses: {why}")
         since_s = self.pending.pause_s
         if since_s is not None and (not self._prints(command) or self.exchange.medium.now_s() - since_s > BOUNDARY_S):
-            self._rest()
+            if self._is_cold():  # by an old report, perhaps
+                self.exchange.send("M105")
+                self.exchange.settle()
+            if not self._is_cold():
+                self._rest()
+
+    def _is_cold(self) -> bool:
+        """Whether the nozzle is being heated and too cold yet for a pause, which pulls filament."""
+        material_c = 0.0 if self.profile is None else self.profile.material.first_layer_nozzle_c
+        now_c, wanted_c = self.reports.temperature.nozzle_c, self.modal.nozzle_c
+        return wanted_c > 0 and now_c is not None and now_c < min(COLD_C, max(wanted_c, material_c) - NEAR_C)
 
     def _prints(self, command: str) -> bool:
         """Whether not to pause before a command: a stroke, or one of a pair that turns the table."""
@@ -355,10 +366,18 @@ class Feed:
                 file_line=history.acknowledged,
                 feed_percent=feed_percent, flow_percent=self.pending.flow_percent,
                 z_offset_mm=self.pending.z_offset_mm,
-                message=self.pending.message or self._trouble or self.reports.waiting or self._silence(),
+                message=self.pending.message or self._trouble or self.reports.waiting or self._silence() or self._delay(pausing),
                 warning=self._warned,
             )
         )  # fmt: skip
+
+    def _delay(self, pausing: bool) -> str:
+        """Message about the heat or the slow command that a requested pause waits for."""
+        window = self.exchange.connection.window
+        slow = next((window.command(line.number) for line in window.flight if line.slow_timeout_s), "") if pausing else ""
+        if pausing and (self._is_cold() or (slow and command_in(slow).waits == "heat")):
+            return "it pauses once it is hot"
+        return f"it pauses after {slow}" if slow else ""
 
     def _warning(self) -> str:
         return self._journal.warning if self._journal is not None else ""

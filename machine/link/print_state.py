@@ -30,7 +30,7 @@ class PrintState(StrEnum):
     RESUMING = "resuming"
     RECONNECTING = "reconnecting"  # the port is lost
     FINISHING = "finishing"  # all lines are sent, the last moves are awaited
-    IN_HAND = "in hand"  # manual control: the user heats and moves the machine
+    IN_HAND = "manual control"  # the user heats and moves the machine
     CANCELLING = "cancelling"  # the heaters are being switched off
     DONE = "done"
     CANCELLED = "cancelled"  # by the user

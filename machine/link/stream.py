@@ -185,6 +185,8 @@ class _Print:
         """Make an emergency stop; returns the result in words."""
         heat = self._last_known()
         words = self._guard.stop()
+        if self._guard.heaters is Heaters.HALTED:
+            self.feed.reports.note_off()
         self.feed.set_state(PrintState.CANCELLING)
         return f"{words}{heat}"
 
@@ -206,6 +208,9 @@ class _Print:
         """Switch the heaters off and lift the tip if the printer responds and knows its position; waits: for homing to end."""
         try:
             heaters = self._guard.switch_off(timeout_s, waits)
+            if heaters is not Heaters.UNPROVED:
+                self.feed.reports.note_off()
+                self.feed.show(self.medium.now_s())
             if heaters is Heaters.OFF and alive:
                 with suppress(PortError):
                     self._settle()

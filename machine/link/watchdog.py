@@ -5,7 +5,7 @@ Firmwares guard their heaters themselves (Marlin: 40 s beyond 4 K, 20 s without 
 only matter where the firmware's are missing or fail.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 
 from machine.gcode.commands import command_named
@@ -113,6 +113,11 @@ class PrinterReports:
         silent_s = 0.0 if self._silent_since_s is None else now_s - self._silent_since_s
         if silent_s > SILENCE_S and any(heater.target_c for heater in self._heaters):
             raise PrinterError(f"the printer has reported no temperature for {silent_s:.0f} s although a heater is on")
+
+    def note_off(self) -> None:
+        """Note that the heaters are proved off, by a report from outside of the conversation."""
+        bed_c = None if self.temperature.bed_target_c is None else 0.0
+        self.temperature = replace(self.temperature, nozzle_target_c=0.0, bed_target_c=bed_c)
 
     def leaves_out(self, command: str) -> bool:
         """Whether a command that the firmware does not know can be omitted: no heat, move, mode or waiting."""

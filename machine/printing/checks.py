@@ -28,7 +28,7 @@ from profiles.machine import Machine
 from profiles.messages import key_name, phrase
 from profiles.profile import Profile
 
-CLEAN = "the dry run of these very lines finds no error: every move is inside the limits and clear of the head"
+CLEAN = "the dry run found no error: every move is within the limits and clear of the head"
 SLACK = 0.01  # mm or deg: rounding of firmware and program
 # The keys on which a program depends: a program made with other values is wrong here. Speeds and accelerations do not count.
 OF_AXIS = ("letter", "stepper", "axis", "point_mm", "sign", "zero_deg")

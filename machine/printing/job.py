@@ -59,7 +59,6 @@ class End:
 
 
 DONE = End(PrintState.DONE, "the print is done")
-CANCELLED = End(PrintState.CANCELLED, "the print was stopped")
 NOT_BEGUN = End(PrintState.DECLINED, "nothing was printed")
 NOT_MOVED = End(PrintState.DECLINED, "nothing was moved or heated")
 

@@ -18,7 +18,7 @@ from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.destination import AtPrinter, SerialPort, Simulated
 from machine.printing.history import recorded
-from machine.printing.job import CANCELLED, DONE, End, Person, PrintJob, Scene
+from machine.printing.job import DONE, End, Person, PrintJob, Scene
 from machine.printing.journal_folder import new_journal
 from machine.printing.ports import describe_answer, identify_printer
 from machine.printing.serial_log import SerialLog, new_log, tap
@@ -206,12 +206,13 @@ def report_end(outcome: Outcome, log: SerialLog | None = None, journal: Journal 
         _point_to(log)
     if outcome.cancelled:
         heaters = f"{Heaters.HALTED.value}: {outcome.halted}" if outcome.halted else HEATERS[outcome.heaters_off]
-        say(f"tiltprint: interrupted after {outcome.acknowledged} lines; {heaters}")
+        sentence = f"the print was cancelled after {outcome.acknowledged} lines; {heaters}"
+        say(f"tiltprint: {sentence}")
         if outcome.kept:
             say(outcome.kept)
         if journal is not None and journal.last.executed and not journal.trouble:
             say(f"tiltprint resume {journal.path} continues it")
-        return CANCELLED
+        return End(PrintState.CANCELLED, sentence)
     summary = f"printed {outcome.acknowledged} lines in {duration(outcome.elapsed_s)}, {outcome.repeated} repeated"
     show(f"{summary} ({Answer(Kind.PRINTER, outcome.firmware).firmware[:60]})\n")
     return DONE

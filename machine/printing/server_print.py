@@ -13,7 +13,7 @@ from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import check_free
 from machine.printing.history import recorded
-from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, Does, End, Person, PrintJob, Scene
+from machine.printing.job import DONE, NOT_BEGUN, Does, End, Person, PrintJob, Scene
 from machine.printing.rescue import STOPPED
 from machine.printing.serial_log import SerialLog
 from machine.printing.servers.follow import Follower
@@ -134,8 +134,9 @@ class ServerPrinter:
             say(f"tiltprint: interrupted; {file} keeps printing on {server.name}")
             return End(state, f"{name} keeps printing on {server.name}: this page no longer follows it")
         after = f" after {progress.line} lines" if progress.line else ""
-        say(f"tiltprint: interrupted; the print was cancelled on {server.name}{after}")
-        return CANCELLED
+        sentence = f"the print was cancelled on {server.name}{after}"
+        say(f"tiltprint: {sentence}")
+        return End(state, sentence)
 
     def _scene(self) -> Scene:
         return Scene(self._log.title, self._log, server=self.server.name)

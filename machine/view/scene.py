@@ -19,8 +19,8 @@ from mdp.pose import unit
 from mdp.save import joint_values, plane_values
 from profiles.axes import RotaryAxis
 from profiles.machine import Machine
-from profiles.messages import terminal_words
-from profiles.profile import Profile
+from profiles.messages import keys_in
+from profiles.profile import Profile, with_labels
 
 RESIDUAL, UPRIGHT = 1, 2  # bits of face_marks
 FOOT_MM = 1e-3
@@ -124,7 +124,8 @@ def finding_records(run: DryRun, machine: Machine, known: bool, shown: NDArray[n
             points = {"workpiece_mm": workpiece_path(machine, at)[0].tolist(), "machine_mm": at[0, :3].tolist()}
         records.append(
             {
-                "severity": finding.severity, "code": finding.code, "message": terminal_words(finding.message),
+                "severity": finding.severity, "code": finding.code, "message": with_labels(finding.message),
+                "keys": ", ".join(keys_in(finding.message)),
                 "line": finding.line, "part": finding.part, "layer": finding.layer, "row": shown_row,
             } | points
         )  # fmt: skip

@@ -269,7 +269,9 @@ def _notes(problem: Problem, parts: int, rows: int, request: SearchRequest) -> l
         notes += _fewer_parts(request.parts, parts, "the search found")
     else:
         counts = problem.count_rejected()
-        notes.append("no cut is worth its seam" if counts[Reason.GAIN] else "no cut is possible: every plane was rejected")
+        worth = "the model stays in one piece: each possible cut would show a seam that costs more than the support it saves"
+        by_hand = phrase("cut by hand", "decompose --planes FILE cuts it where you choose")
+        notes.append(f"{worth}; {by_hand}" if counts[Reason.GAIN] else "no cut is possible: every plane was rejected")
     if zones.no_seam.anywhere and problem.terms.seam_mm <= 0.0:
         notes.append(
             f"[[no_seam]] has no effect on cuts, since seams cost nothing ({key_name('search.objective')}, "

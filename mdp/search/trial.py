@@ -15,7 +15,7 @@ import numpy as np
 
 from mdp.clearance import collision_points, lowest_body
 from mdp.cost.forecast import Forecast, PartForecast
-from mdp.cut import Solid, above, below, mesh_of, passing_places
+from mdp.cut import Solid, above, below, cut, mesh_of, passing_places
 from mdp.mesh import Floats, Mesh
 from mdp.overhang import PLATE_TOLERANCE_MM, UP
 from mdp.pedestal import on_pedestal
@@ -94,7 +94,12 @@ class Trials:
         self._node = root = problem.root  # after the cuts of the last trial
         self._surface = Forecast.of(root.remainder, problem.terms, root.seam_weights)
         self._keys: list[Key] = []  # of the planes of these cuts, as they were given
+        self._aside: frozenset[Key] = frozenset()
         self.uncut_support_mm2 = self._surface.parts([])[1]  # of the model in one piece
+
+    def set_aside(self, planes: Sequence[Plane]) -> None:
+        """Set infeasible planes that further trials cut without a check, so that the planes after them are tried all the same."""
+        self._aside = frozenset(_key(plane) for plane in planes)
 
     def attempt(self, planes: Sequence[Plane], most_cuts: float = inf) -> Trial:
         """Try the base planes of the parts from the second, in print order. most_cuts: limit on the number of cuts made; parts
@@ -167,17 +172,24 @@ class Trials:
     def _keep_common_cuts(self, order: Sequence[Plane]) -> None:
         """Drop the cuts from the first one that differs from these planes."""
         alike = 0
-        while alike < min(len(order), len(self._keys)) and self._keys[alike] == _key(order[alike]):
+        while alike < min(len(order), len(self._keys)):
+            key = _key(order[alike])
+            if self._keys[alike] != (key in self._aside, *key):
+                break
             alike += 1
         self._node = self._node.path[alike]
         del self._keys[alike:]
 
     def _cut_off(self, planes: Sequence[Plane]) -> Rejection | None:
         """Make further cuts, or return the rejection of one."""
-        reached = try_planes(self._problem, self._node, planes)
-        self._node = reached.node if isinstance(reached, Rejection) else reached
-        self._keys += map(_key, planes[: len(self._node.cuts) - len(self._keys)])
-        return reached if isinstance(reached, Rejection) else None
+        for plane in planes:
+            aside = _key(plane) in self._aside
+            reached = _cut_anyway(self._problem, self._node, plane) if aside else try_planes(self._problem, self._node, [plane])
+            if isinstance(reached, Rejection):
+                return reached
+            self._node = reached
+            self._keys.append((aside, *_key(plane)))
+        return None
 
     def _named(self, order: Sequence[Plane]) -> list[Plane]:
         """Planes in the order of their cuts, with their limbs named by vertices where possible."""
@@ -187,6 +199,8 @@ class Trials:
 
     def _look(self, plane: Plane) -> Rejection | None:
         """The rejection of a plane at the current node, or None. Only limbs are actually cut, since their remainder may float."""
+        if _key(plane) in self._aside:
+            return None
         if plane.limbs_mm is None:
             return rejection(self._problem, self._node, plane)
         child = try_planes(self._problem, self._node, [plane])
@@ -201,6 +215,15 @@ def _are_near(plane: Plane, other: Plane, apart_mm: float) -> bool:
 def _key(plane: Plane) -> Key:
     limbs_mm = () if plane.limbs_mm is None else tuple(plane.limbs_mm.ravel().tolist())
     return *plane.normal.tolist(), plane.offset_mm, *limbs_mm
+
+
+def _cut_anyway(problem: Problem, node: Node, plane: Plane) -> Node:
+    """The node after a cut by an infeasible plane; its solid is unchanged if the plane does not divide it."""
+    named, rest = name_limbs(node, plane), node.solid
+    if isinstance(named, Plane):
+        plane, left = named, below(rest, named) if named.limbs_mm is None else cut(rest, named)[1]
+        rest = rest if left.is_empty() else left
+    return Node(rest, problem.terms, node.places, node, plane)
 
 
 def obstacle_of(problem: Problem, rejected: Rejection, plane: Plane) -> Obstacle | None:

@@ -184,6 +184,22 @@ def test_every_colouring_has_a_picture_of_its_own(foreign: Browser) -> None:
         pictures.add(foreign.value(PICTURE))
     assert len(pictures) == 6
     assert text(foreign, "legend").startswith("fan, %")
+    foreign.value("localStorage.clear()")
+
+
+def test_beads_are_coloured_by_line_type_until_a_choice_is_made_which_holds_for_the_next_print(
+    page: Browser, tmp_path: Path
+) -> None:
+    assert text(page, "legend").startswith("line type")
+    put(page, "colour-by", "speed")
+    profile, printed = program()
+    opened(page, tmp_path, print_page("the same again", printed, profile))
+    assert page.value("document.getElementById('colour-by').value") == "speed"
+    assert text(page, "legend").startswith("speed, mm/s")
+    page.value("localStorage.setItem('colour by', JSON.stringify({ mode: 'a colouring of an older page' }))")
+    opened(page, tmp_path, print_page("the same again", printed, profile))
+    page.value("localStorage.clear()")
+    assert page.value("document.getElementById('colour-by').value") == "kind"
 
 
 def test_a_kind_of_line_can_be_left_out(page: Browser) -> None:
@@ -420,6 +436,15 @@ def test_the_picture_returns_after_the_graphics_card_has_let_go_of_it(page: Brow
     page.wait("document.getElementById('notice').hidden")
     page.wait(f"{PICTURE}.then((now) => now === {json.dumps(before)})")
     page.complaints.clear()
+
+
+def test_the_picture_keeps_its_width_when_the_report_is_opened(page: Browser) -> None:
+    page.resize(1440, 600)
+    width = "document.getElementById('canvas').clientWidth"
+    before = page.value(width)
+    page.click("#tab-report")
+    assert page.value(width) == before
+    assert page.value("[...document.querySelectorAll('#report .table')].every((table) => table.tabIndex === 0)")  # it may scroll
 
 
 def test_the_report_holds_every_part_and_is_printed_with_the_picture(page: Browser) -> None:

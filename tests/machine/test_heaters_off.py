@@ -166,7 +166,7 @@ def test_heaters_that_are_to_stay_on_go_off_when_letting_go_fails(monkeypatch: M
     whole, printer, keeping = Steps(), VirtualPrinter(PROFILE.machine), HandCommand(HandDoes.LET_GO, keep_heat=True)
     ended = in_hand(whole, printer, monkeypatch, HEAT, keeping)
     assert targets_c(printer) == (215.0, 60.0)
-    assert ended.sentence == "let go of; nozzle set to 215 °C and bed set to 60 °C stays on"
+    assert ended.sentence == "disconnected; nozzle set to 215 °C and bed set to 60 °C stays on"
     for step in range(1, whole.count + 1):
         printer = VirtualPrinter(PROFILE.machine)
         with pytest.raises(RuntimeError):
@@ -193,7 +193,7 @@ def test_a_start_block_that_cannot_be_filled_in_is_told_and_nothing_moves(monkey
     steps, printer = Steps(), VirtualPrinter(PROFILE.machine)
     ended = in_hand(steps, printer, monkeypatch, HEAT, HOME, HandCommand(HandDoes.LET_GO))
     assert "{warmth}" in steps.last["status"].message
-    assert (ended.sentence, targets_c(printer)) == ("let go of; the heaters are off", (0.0, 0.0))
+    assert (ended.sentence, targets_c(printer)) == ("disconnected; the heaters are off", (0.0, 0.0))
     assert not happened(printer.record, "homed XYZAC")
 
 
@@ -204,7 +204,7 @@ def test_homing_by_hand_heats_nothing_and_does_not_wait(heat: str, monkeypatch: 
     monkeypatch.setattr(f"{__name__}.PROFILE", heated)
     printer = VirtualPrinter(PROFILE.machine)
     ended = in_hand(Steps(), printer, monkeypatch, HOME, HandCommand(HandDoes.LET_GO, keep_heat=True))
-    assert (ended.sentence, targets_c(printer)) == ("let go of; no heater is on", (0.0, 0.0))
+    assert (ended.sentence, targets_c(printer)) == ("disconnected; no heater is on", (0.0, 0.0))
     assert happened(printer.record, "homed XYZAC")
     assert printer.record.unknown == 0
 
@@ -226,7 +226,7 @@ def test_a_termination_request_lets_go_of_a_printer_in_hand(monkeypatch: MonkeyP
         ended = in_hand(Terminated(), printer, monkeypatch, HEAT)
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert (ended.sentence, targets_c(printer)) == ("let go of; the heaters are off", (0.0, 0.0))
+    assert (ended.sentence, targets_c(printer)) == ("disconnected; the heaters are off", (0.0, 0.0))
 
 
 def test_an_emergency_stop_counts_while_the_heaters_are_switched_off() -> None:

@@ -131,6 +131,8 @@ def test_a_text_that_is_not_in_the_page_comes_from_the_prints_file_and_from_no_o
     wait_for_marked(page, line, lines)
 
 
+# Sentence and title of each finding.
+FINDINGS = "[...document.querySelectorAll('#sliced-findings button')].map((each) => [each.childNodes[1].textContent, each.title])"
 FRAME = "document.getElementById('print-page').contentWindow"
 
 
@@ -153,7 +155,7 @@ def test_parts_appear_are_compared_looked_at_and_marked_when_the_bench_changes(b
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: add a plane'")
     slice_it(browser)
     browser.wait("document.documentElement.dataset.walls === '1 2'")
-    assert "takes" in text(browser, "sliced-told")
+    assert "print time" in text(browser, "sliced-told")
     head, row = browser.value("[...$('joints').rows].map((row) => [...row.cells].map((cell) => cell.textContent))")
     assert head == ["joint of part", "area", "contact", "plastic", "seam", "breaks at"]
     assert row[0] == "2"
@@ -173,6 +175,21 @@ def test_parts_appear_are_compared_looked_at_and_marked_when_the_bench_changes(b
     browser.click("#redo")
     browser.wait("!document.body.classList.contains('stale') && !$('save-gcode').disabled")
     assert browser.complaints == []
+
+
+def test_figures_of_the_slices_before_are_not_shown_while_it_is_sliced_again(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "flat.stl", stl(box(9, 9, 1)))
+    slice_it(browser)
+    valid = text(browser, "sliced-told")
+    look = "[$('sliced-told').textContent, $('verdict').checkVisibility(), $('verdict-print').checkVisibility()]"
+    seen = f"if (state.slicing && state.sliced) window.seen = {look}"
+    browser.value(f"modules['page/store'].subscribe(({{ state }}) => {{ {seen}; }})")
+    with bench.line() as page:
+        page.do("set", key="process.brim_mm", value="5")
+    browser.wait("document.body.classList.contains('stale')")
+    slice_it(browser)
+    assert browser.value("window.seen") == ["print time…filament…", False, False]
+    assert text(browser, "sliced-told") not in (valid, "print time…filament…")
 
 
 def test_a_refused_slicing_opens_no_preview_of_what_another_page_slices(browser: Browser, bench: Running) -> None:
@@ -206,6 +223,11 @@ def test_a_finding_leads_to_its_place_and_errors_are_saved_only_on_demand(browse
         "[document.querySelector('#findings .chosen b').textContent, Number(document.getElementById('readout-line').textContent)]"
     )
     chosen, line = browser.value(in_frame(browser, where))
+    guess = [finding for finding in browser.value(FINDINGS) if "not calibrated" in finding[0]]
+    assert guess[0] in browser.value(in_frame(browser, FINDINGS.replace("#sliced-findings", "#findings")))
+    assert "Tilt axis: Point on the axis" in guess[0][0]
+    assert "machine.tilt.point_mm" not in guess[0][0]
+    assert "machine.tilt.point_mm" in guess[0][1]
     assert chosen == "error: cold-extrusion"
     assert f"line {line}" in browser.value("document.querySelector('#sliced-findings .error small').textContent")
     browser.click("#leave-print")
@@ -231,7 +253,7 @@ def test_errors_of_the_slices_refuse_a_print_at_once_and_stale_slices_cannot_be_
     browser.wait("!$('print-problem').hidden && !$('force-line').hidden")
     problem = browser.value("$('print-problem').textContent")
     assert problem.startswith("the dry run found 2 errors, the first: ")
-    assert problem.endswith("(tick Go on anyway to print it)")
+    assert problem.endswith("(tick Continue anyway to print it)")
     assert browser.value("$('run').hidden")  # nobody has been asked who is there
     browser.click("#undo")
     browser.wait("$('check').disabled && $('force-line').hidden && $('print-problem').hidden")
@@ -249,7 +271,7 @@ def test_errors_of_the_slices_refuse_a_print_at_once_and_stale_slices_cannot_be_
     browser.wait("$('check').disabled && !$('unsliced').hidden")
     assert browser.value("$('unsliced').checkVisibility()")
     assert browser.value("$('unsliced').textContent") == (
-        "Nothing to print: what is on the workbench has changed since it was sliced: slice it again."
+        "What is on the workbench has changed since it was sliced: slice it again."
     )
     asked = "WebSocket.prototype.send = function (text) { window.asked = text; }"
     browser.value(f"{{ window.asked = ''; window.send = WebSocket.prototype.send; {asked}; }}")

@@ -196,10 +196,10 @@ def test_firefox_prints_watches_takes_the_command_back_and_stops_the_machine(fir
         firefox.click("#begin")
         second_page.until(lambda state: state.get("live"))
         second_page.command("pause")
-        assert second_page.refused() == "another page commands this print: take the command over first"
+        assert second_page.refused() == "another page controls this print: take control first"
         second_page.command("take")
         firefox.wait("!$('held').hidden && $('run-commands').hidden")
-        assert "Another page commands this print; this one watches." in firefox.value("$('held-told').textContent")
+        assert "Another page controls this print; this one only watches." in firefox.value("$('held-told').textContent")
         firefox.click("#take")
         firefox.wait("$('held').hidden && !$('run-commands').hidden")
         put(firefox, "$('search-settings')", "", "input")

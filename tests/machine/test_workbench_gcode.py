@@ -30,6 +30,7 @@ def test_a_dropped_file_is_looked_at_and_printed_as_it_is(tmp_path: Path) -> Non
     with workbench(*QUICK) as running, small_browser() as browser, prints_line(running, "watching") as page:
         opened(browser, running, "box.gcode", GOOD)
         assert browser.value(f"{VIEW}.getElementById('title').textContent") == "box.gcode"
+        assert browser.value("[$('title').textContent, document.title]") == ["box.gcode", "box.gcode – tiltprint"]
         assert "Ready to print" in browser.value("$('gcode-told').textContent")
         choose(browser, "second.gcode", GOOD.replace("X10", "X12").encode())
         browser.wait(f"{VIEW}?.getElementById('title')?.textContent === 'second.gcode'")
@@ -37,7 +38,7 @@ def test_a_dropped_file_is_looked_at_and_printed_as_it_is(tmp_path: Path) -> Non
         browser.wait(f"{VIEW}?.getElementById('title')?.textContent === 'box.gcode'")
         browser.click("#check")
         browser.wait("!$('run-ask').hidden")
-        assert browser.value("$('run-title').textContent") == "box.gcode at the simulated printer"
+        assert browser.value("$('run-title').textContent") == "box.gcode on the simulated printer"
         browser.click("#begin")
         done = page.until(lambda seen: seen["is_over"])
         assert done["sentence"] == "the print is done"

@@ -63,7 +63,7 @@ def test_a_plane_snaps_to_the_neck_nearby_and_where_there_is_none_that_is_told(b
         assert problem == f"there is no neck near the plane of part 2: {where}"
 
 
-def test_marks_are_in_the_plan_that_the_command_line_cuts_by_and_drive_planes_away(bench: Running, folder: Path) -> None:
+def test_marks_are_in_the_plan_of_the_command_line_and_planes_that_they_forbid_are_invalid(bench: Running, folder: Path) -> None:
     with bench.line() as page:
         opened(page, bench, "tee.stl")
         added(page, 20.0, 35.0)
@@ -74,13 +74,18 @@ def test_marks_are_in_the_plan_that_the_command_line_cuts_by_and_drive_planes_aw
         assert sum(byte == 2 for byte in bench.ask(f"marks/{state['marks']}")[1]) == 6  # the flat back of the T
         page.do("mark", kind="keep", min_mm=[-2, -2, 33], max_mm=[2, 2, 37])
         state = page.until(lambda state: state["note"])
-        why = "its plane would pass through protected area 1 (Undo brings it back)"
-        assert (state["note"], state["problem"]) == (f"the cut of part 3 was removed: {why}", "")
-        assert [cut["offset_mm"] for cut in state["cuts"]] == [20.0]
-        page.do("lock", part=2, locked=True)
-        page.do("mark", kind="keep", min_mm=[-2, -2, 19], max_mm=[2, 2, 21])
-        problem = page.until(lambda state: "locked" in state["problem"])["problem"]
-        assert problem.endswith("part 2 is locked and would be in the way: its plane would pass through protected area 2")
+        why = "its plane would pass through protected area 1"
+        assert (state["note"], state["problem"]) == (f"part 3 cannot be cut off: {why}", "")
+        assert ([cut["offset_mm"] for cut in state["cuts"]], state["invalid"]) == ([20.0, 35.0], ["", why])
+        page.do("slice")
+        refused = f"part 3 cannot be cut off: {why}: move or remove its plane, or find parts again"
+        assert page.until(lambda state: state["problem"])["problem"] == refused
+        page.do("move", part=2, **LEVEL, offset_mm=21.0)  # the others are moved all the same
+        state = page.until(lambda state: state["cuts"][0]["offset_mm"] == 21.0)
+        assert page.until(lambda state: state["invalid"] == ["", why])["problem"] == ""
+        page.do("undo")
+        page.do("remove", part=3)
+        page.until(lambda state: state["parts"] == 2)
         Path("plan.toml").write_bytes(bench.ask("plan.toml")[1])
         plan = Path("plan.toml").read_text()
         assert all(
@@ -89,7 +94,8 @@ def test_marks_are_in_the_plan_that_the_command_line_cuts_by_and_drive_planes_aw
         assert main(["decompose", "tee.stl", *QUICK, "--plan", "plan.toml", "-o", "parts"]) == 0
         page.do("undo")
         page.do("undo")
-        assert len(page.until(lambda state: len(state["cuts"]) == 2)["zones"]) == 2
+        state = page.until(lambda state: len(state["zones"]) == 2)
+        assert (len(state["cuts"]), state["invalid"]) == (2, ["", ""])
 
 
 def test_strokes_of_a_brush_join_one_zone_and_an_eraser_takes_faces_from_all(bench: Running, folder: Path) -> None:
@@ -339,3 +345,84 @@ def test_the_others_are_found_beside_a_locked_plane_and_keep_out_of_what_is_mark
             x, y, z = cut["normal"]
             heights = [x * a + y * b + z * c - cut["offset_mm"] for a in (5.5, 12) for b in (-4, 4) for c in (25, 32)]
             assert not min(heights) < -1e-6 < 1e-6 < max(heights)
+
+
+def test_a_plane_in_a_protected_area_stays_with_its_reason_on_its_card_and_tools_and_beside_the_slice_button(
+    browser: Browser, bench: Running, folder: Path
+) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 20.0, 35.0)
+        looked_at(browser, bench, "tee.stl")
+        browser.click("#parts-list input[value='3']")
+        page.do("mark", kind="keep", min_mm=[-2, -2, 33], max_mm=[2, 2, 37])
+        reason = "Cannot be cut off here: its plane would pass through protected area 1."
+        browser.wait(f"$('plane-told').textContent === {json.dumps(reason)}")
+        cards = browser.value("[...document.querySelectorAll('#parts-list .card .invalid')].map((text) => text.textContent)")
+        assert cards == [reason]
+        why = "part 3 cannot be cut off: its plane would pass through protected area 1: move or remove its plane"
+        assert browser.value("$('unsliceable').textContent") == f"Cannot be sliced: {why}, or find parts again."
+        browser.click("#put-near")
+        browser.wait(f"$('unsliceable').textContent === '' && {FREE}")
+        assert page.until(lambda state: state["invalid"] == ["", ""])["cuts"][0]["offset_mm"] == 20.0
+        assert browser.complaints == []
+
+
+def test_the_knobs_of_a_plane_have_words_and_colours_of_their_own(browser: Browser, bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 20.0)
+        looked_at(browser, bench, "tee.stl")
+        browser.click("#parts-list input[value='2']")
+        browser.wait("!$('handles').hidden")
+        seen = "[...$('handles').children].map((knob) => [getComputedStyle(knob, '::after').content, knob.title.split(' ')[0]])"
+        assert browser.value(seen) == [['"move"', "Move"], ['"turn"', "Turn"], ['"tilt"', "Tilt"]]
+        colours = "new Set([...$('handles').children].map((knob) => getComputedStyle(knob).backgroundColor)).size"
+        assert browser.value(colours) == 3
+
+
+def test_the_chosen_plane_is_seen_through_a_thick_model_and_about_it(browser: Browser, bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 20.0)
+        looked_at(browser, bench, "tee.stl")
+        browser.click("[data-view='top']")  # the arms hide what is cut
+        browser.value("$('handles').style.visibility = $('plane-tools').style.visibility = 'hidden'")
+        browser.click("#parts-list input[value='1']")
+        before, drawn = pixels(browser).astype(int), browser.value("document.documentElement.dataset.drawn")
+        browser.click("#parts-list input[value='2']")
+        browser.wait(f"document.documentElement.dataset.drawn !== '{drawn}'")
+        after = pixels(browser).astype(int)
+        arms = before[..., 0] - before[..., 2] > 60  # orange
+        veiled = arms & (abs(after - before).sum(axis=2) > 20)
+        assert arms.sum() > veiled.sum() > 100
+
+
+def test_a_number_below_the_slider_is_taken_by_a_click_and_its_costs_are_told_beside_those_of_one_part(
+    browser: Browser, bench: Running, folder: Path
+) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        looked_at(browser, bench, "tee.stl")
+        page.do("search", orient=False)
+        rows = page.until(lambda state: state["front"] and not state["search"] and state["priced"])["front"]
+        one, row = rows[0], next(row for row in rows if row["parts"] > 1)
+        browser.wait(f"$('front-marks').children.length === {len(rows)} && {FREE}")
+        browser.value(f"$('front-marks').children[{rows.index(row)}].querySelector('button').click()")
+        page.until(lambda state: state["parts"] == row["parts"])
+        less = round(100 * (1 - row["support_area_mm2"] / one["support_area_mm2"]))
+        browser.wait(f"$('front-told').textContent.includes('against 1 part−{less} % support, ')")
+
+
+def test_earlier_work_is_opened_with_a_plane_that_its_mark_forbids(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 20.0, 35.0)
+        page.do("mark", kind="keep", min_mm=[-2, -2, 33], max_mm=[2, 2, 37])
+        page.until(lambda state: state["note"])
+        opened(page, bench, "glass.stl")
+        work = json.loads(bench.ask("kept")[1])[0]
+        assert work["name"] == "tee.stl"
+        assert bench.ask(f"kept/{work['key']}", "POST", b"", Origin=f"http://127.0.0.1:{bench.port}")[0] == 200
+        state = page.until(lambda state: state["model"]["name"] == "tee.stl" and any(state["invalid"]))
+        assert state["invalid"] == ["", "its plane would pass through protected area 1"]

@@ -8,7 +8,7 @@ from pathlib import Path
 from time import monotonic
 
 from machine.cli.terminal.at_terminal import AtTerminal, exit_code
-from machine.cli.terminal.report import print_table
+from machine.cli.terminal.report import print_table, table
 from machine.cli.terminal.requests import PrintOptions, ResumeOptions, WatchOptions
 from machine.link.print_state import PrintState
 from machine.notices import plain_line, say, show
@@ -77,10 +77,14 @@ def list_resumable() -> int:
     """List the prints that can be resumed on stdout, newest first; 0 even if there are none."""
     journals = resumable_journals()
     if not journals:
-        say("no print of this computer was cut off or cancelled")
+        say("there is no interrupted or cancelled print on this computer")
+        return 0
+    rows = [["print", "machine", "up to line", "interrupted"]]
     for journal in journals:
-        what = plain_line(f"{journal.name} on {journal.machine}, up to line {journal.line}")
-        show(f"{plain_line(str(journal.path))}\n    {what}, {datetime.fromtimestamp(journal.written_s):%Y-%m-%d %H:%M}\n")
+        when = f"{datetime.fromtimestamp(journal.written_s):%Y-%m-%d %H:%M}"
+        rows.append([plain_line(journal.name), plain_line(journal.machine), str(journal.line), when])
+    paths = ["journal", *(plain_line(str(journal.path)) for journal in journals)]
+    show("".join(f"{line}  {path}\n" for line, path in zip(table(rows).splitlines(), paths, strict=True)))
     return 0
 
 

@@ -65,6 +65,18 @@ export function duration(seconds) {
 
 export const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
 
+/** now: an object, at first what was kept or usual has; keep(changes) changes it. storage: sessionStorage or localStorage; where a browser keeps nothing, a reload forgets. */
+export function keptIn(storage, key, usual) {
+  const kept = { now: { ...usual } };
+  const attempt = (act) => { try { act(); } catch { /* nothing is kept here */ } };
+  attempt(() => Object.assign(kept.now, JSON.parse(globalThis[storage].getItem(key) || "{}")));
+  kept.keep = (changes) => {
+    Object.assign(kept.now, changes);
+    attempt(() => globalThis[storage].setItem(key, JSON.stringify(kept.now)));
+  };
+  return kept;
+}
+
 /** Dark or light, as changed(dark) is told: what the system prefers until a person says otherwise, by the button or what this gives. */
 export function themeSwitch(changed) {
   const system = matchMedia("(prefers-color-scheme: dark)"), dark = () => told ?? system.matches;
@@ -118,9 +130,9 @@ export function bells() {
 }
 
 /** A finding as a button that goes there, where it has a place. */
-export function findingButton({ severity, code, message, part, layer, line }, onclick, { whole = "the whole file", ending = "", ...more } = {}) {
+export function findingButton({ severity, code, message, keys = "", part, layer, line }, onclick, { whole = "the whole file", ending = "", ...more } = {}) {
   const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
-  return button("", onclick, { className: severity, ...more }, made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? where + ending : whole }));
+  return button("", onclick, { className: severity, title: keys, ...more }, made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? where + ending : whole }));
 }
 
 /** An element put where a place of the picture is seen, in pixels; null: it is not. */
@@ -146,7 +158,7 @@ export function moveFocus(container, selector, steps, reached = () => {}) {
 }
 
 /** chosen(panel's id) is called with every choice. */
-export function tabsOf(chosen) {
+export function tabsOf(chosen = () => {}) {
   const all = [...document.querySelectorAll("[role=tab]")];
   const choose = (tab) => {
     all.forEach((each) => {

@@ -157,6 +157,12 @@ class Edit:
         """The cuts in the wanted order."""
         return self.orders[0][0]
 
+    @property
+    def placed(self) -> PlannedPart | None:
+        """The part whose plane was placed."""
+        cuts, number = self.orders[0]
+        return cuts[number - 2] if number else None
+
 
 def add(bench: Bench, *, normal: Direction, offset_mm: Mm, after: int | None = None, near: bool = False) -> Edit:
     """Add a plane for a new part, printed after the part `after`, by default last."""

@@ -16,11 +16,11 @@ from machine.pipeline.output import plain_name
 from machine.pipeline.requests import Given
 from machine.workbench.bench.bench import Bench
 from machine.workbench.bench.part_settings import option, own_values
-from machine.workbench.bench.values import with_value
 from mdp.pose import turned_further
 from profiles.errors import ProfileError
 from profiles.frozen import TITLES, Frozen, may_be_left_out, unit_of
 from profiles.machine import GCODE
+from profiles.messages import key_name
 from profiles.part_settings import OF_PARTS_ON_PLASTIC, part_keys
 from profiles.places import OF_KIND, known, shipped, tables
 from profiles.profile import DEFAULTS, SECTIONS, Profile, load, with_part_settings
@@ -78,11 +78,27 @@ def settings_of(given: Given, kind: str) -> list[str]:
     return [setting for setting in given.settings if setting.partition(".")[0].strip() in OF_KIND[kind]]
 
 
-def with_name(given: Given, kind: str, name: str) -> Given:
-    """Choose another machine, material or process. Raises ProfileError for an unknown one."""
+def check_known(kind: str, name: str) -> None:
+    """Raise ProfileError for an unknown machine, material or process."""
     if name not in known(kind):
         raise ProfileError(f"{name!r} is no {kind}: {', '.join(known(kind))} are known")
-    return with_value(given, kind, name)
+
+
+def with_allowed(given: Given, before: Profile) -> tuple[Given, str]:
+    """The settings that a profile allows, and a sentence about the others, "" without any. Raises ProfileError where the profile
+    is invalid without settings."""
+    with suppress(ProfileError):
+        profile_as_given(given, before)
+        return given, ""
+    allowed = replace(given, settings=())
+    profile_as_given(allowed, before)
+    for setting in given.settings:
+        with suppress(ProfileError):
+            more = replace(allowed, settings=(*allowed.settings, setting))
+            profile_as_given(more, before)
+            allowed = more
+    lost = [key_name(key_of(setting)) for setting in given.settings if setting not in allowed.settings]
+    return allowed, f"{', '.join(lost)} {'is' if len(lost) == 1 else 'are'} as in the profile, which does not allow your value"
 
 
 def profile_labels(kind: str, chosen: str) -> dict[str, str]:

@@ -36,7 +36,7 @@ IDLE_S = 1800.0
 LEVEL_DEG = 0.05  # M114 reports hundredths
 MOST_JOG_MM = 100.0
 JOG_MM_S = {"X": 50.0, "Y": 50.0, "Z": 10.0}
-LET_GO = "let go of; the heaters are off"
+LET_GO = "disconnected; the heaters are off"
 
 
 def by_hand(job: PrintJob, person: AtPage) -> End:
@@ -75,7 +75,7 @@ class Hand:
                 session.greet()
                 sentence = self._until_let_go()
             except LeftError:
-                sentence = LET_GO if session.exchange.greeted else "let go of; nothing was heated or moved"
+                sentence = LET_GO if session.exchange.greeted else "disconnected; nothing was heated or moved"
             self._person.tell(state=PrintState.CANCELLING)
         return End(PrintState.DONE, sentence)
 
@@ -86,7 +86,7 @@ class Hand:
                 command = self._person.by_hand.get_nowait()
             except Empty:
                 if monotonic() - self._asked_s > IDLE_S:
-                    return "nothing was asked for half an hour; the heaters are off"
+                    return "no command for half an hour; the heaters are off"
                 self._session.listen()
                 if monotonic() - self._looked_s > LOOK_S:
                     self._look()
@@ -95,7 +95,7 @@ class Hand:
             if command.does == HandDoes.LET_GO and command.keep_heat:
                 heated = self._session.heated()
                 self._session.keep_heat = True
-                return f"let go of; {heated} stays on" if heated else "let go of; no heater is on"
+                return f"disconnected; {heated} stays on" if heated else "disconnected; no heater is on"
             if command.does == HandDoes.LET_GO:
                 break
             self._do(command)
@@ -142,7 +142,7 @@ class Hand:
         if command.does == HandDoes.COOL:
             return ["M104 S0", "M140 S0"]
         if command.does == HandDoes.JOG and not self._homed:
-            raise MoveError("the head is moved only once it was homed here: home it first")
+            raise MoveError("the head moves only after homing here: home it first")
         self._session.command("M114")
         check_level(machine, self._at(), homing=command.does == HandDoes.HOME)
         if command.does == HandDoes.HOME:

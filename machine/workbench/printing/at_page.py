@@ -31,9 +31,9 @@ LAST_WORD_S = 5.0  # a server that hangs is not waited for any longer
 LINES_KEPT = 100  # of the program's messages
 BEGIN, LEAVE = "begin", "leave"  # LEAVE: a print on a server continues without this program
 BEFORE_LIVE = {PrintState.CHECKING: "checking …", PrintState.PRINTING: "starting", PrintState.CANCELLING: "ending"}
-IS_READY = "Is the table free, its surface clean, the filament loaded, and nobody's hand in the machine?"
-IS_KEPT = "The server keeps the file; nothing prints before somebody starts it there."
-HEATERS_OFF = "The heaters go off, and what is printed stays as it is."
+IS_READY = "Is the table empty and clean, is the filament loaded, and are all hands out of the machine?"
+IS_KEPT = "The server stores the file; nothing prints until someone starts it there."
+HEATERS_OFF = "The heaters go off; the printed part stays on the table."
 ANSWERS = (BEGIN, LEAVE, Command.CANCEL, Command.EMERGENCY_STOP)  # to the question whether to begin
 
 
@@ -95,9 +95,9 @@ class JobState:
         if self.live:
             return self.status.in_words()
         if self.state is PrintState.UPLOADING:
-            return self.status.message or "handing the file over"
+            return self.status.message or "uploading"
         if self.state is PrintState.READY:
-            return "ready to print" if self.starts else "ready to be handed over"
+            return "ready to print" if self.starts else "ready to upload"
         return BEFORE_LIVE.get(self.state, f"{self.state}")
 
     def texts(self) -> dict[str, str]:
@@ -106,11 +106,11 @@ class JobState:
         state = ": ".join(filter(None, (self.state, self.status.warning)))
         ends = "The server ends it, as its own macros say." if self.server else HEATERS_OFF
         return {
-            "run-title": f"{'the rest of ' * bool(self.resumes)}{self.name} at {port}",
+            "run-title": f"{'the rest of ' * bool(self.resumes)}{self.name} on {port}",
             "run-news": f"{self.name}: {self.sentence if self.state.is_over else state}",  # a reader need not hear every per cent
             "ask-told": self.question or (IS_READY if self.starts else IS_KEPT),
-            "begin": "Yes, go on" if self.resumes else "Print now" if self.starts else "Hand it over",
-            "leave": "No, leave it" if self.resumes else "Not now",
+            "begin": "Resume now" if self.resumes else "Print now" if self.starts else "Upload",
+            "leave": "Not now",
             "pause": "Resume" if self.state.is_away else "Pause",
             "sure-told": f"Cancel this print? {ends}",
         }
@@ -118,7 +118,7 @@ class JobState:
 
 def first_state(job: PrintJob) -> JobState:
     """The state of a print before its process has reported anything."""
-    name = job.name or {Does.HAND: "by hand", Does.FOLLOW: "what it prints"}.get(job.does, "")
+    name = job.name or {Does.HAND: "manual control", Does.FOLLOW: "the current print"}.get(job.does, "")
     return JobState(
         name=name if job.cut_off is None else job.cut_off.stem,
         machine=job.profile.machine.name if job.does is Does.PRINT and job.profile is not None else "",

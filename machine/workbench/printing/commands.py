@@ -51,7 +51,7 @@ class PageOfPrints:
         """The print with this number. Raises PrinterError if it does not exist, or another page controls it."""
         running = self.prints.numbered(number)
         if running.holder != self.name:
-            raise PrinterError("another page commands this print: take the command over first")
+            raise PrinterError("another page controls this print: take control first")
         return running
 
 

@@ -110,7 +110,7 @@ class RunningPrint:
     def leave(self) -> None:
         """Leave a print to its print server. Raises PrinterError for other prints."""
         if not self.state.server:
-            raise PrinterError("only a print on a print server goes on by itself: this one ends with the workbench")
+            raise PrinterError("only a print on a print server continues by itself: this one ends with the workbench")
         self.say((LEAVE,))
 
     def pause(self) -> None:
@@ -134,7 +134,7 @@ class RunningPrint:
     def by_hand(self, *, does: HandWord, axis: str = "", by_mm: float = 0.0, keep_heat: bool = False) -> None:
         """Send a command of manual control. Raises PrinterError if the printer is not under manual control."""
         if self.state.state is not PrintState.IN_HAND:
-            raise PrinterError("this cannot be done by hand now")
+            raise PrinterError("the printer is not under manual control now")
         self.say((HandCommand(does, axis[:1], by_mm, keep_heat),))
 
     def end(self) -> None:
@@ -187,7 +187,8 @@ class RunningPrint:
         except UserError as error:
             self._end(End(PrintState.LEFT, f"{name} was not cancelled: {error}"))
             return
-        sentence = "the print was stopped" if cancelled else f"there was nothing to cancel: {at.name} prints nothing any more"
+        nothing = f"there was nothing to cancel: {at.name} prints nothing any more"
+        sentence = f"the print was cancelled on {at.name}" if cancelled else nothing
         self._end(End(PrintState.CANCELLED, sentence))
 
     async def _end_without_process(self) -> None:

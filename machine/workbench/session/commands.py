@@ -10,7 +10,7 @@ from functools import partial
 from typing import Any, Literal
 
 from machine.workbench.bench.changes import CHANGES, EDITS, MARKINGS, WORDS, move
-from machine.workbench.bench.settings import with_name, with_typed, without_settings
+from machine.workbench.bench.settings import check_known, profile_labels, with_typed, without_settings
 from machine.workbench.bench.values import Arguments, Asked, Direction, Mm, arguments_of, read_command
 from machine.workbench.session.session import Session
 from mdp.ranking.ranker import CLASSIC
@@ -89,9 +89,17 @@ def reset(session: Session, *, kind: ProfileKind | None = None) -> Work:
     return session.take_given(f"take {changes} back", lambda given: without_settings(given, kind))
 
 
+def slice_parts(session: Session) -> None:
+    """Slice the model, unless planes on the bench cannot be cut."""
+    if sentence := session.trials.unsliceable():
+        raise PlanError(sentence)
+    session.slicing.slice()
+
+
 def take_profile(session: Session, *, kind: ProfileKind, name: str) -> Work:
     """Choose another machine, material or process."""
-    return session.take_given(f"take {name}", lambda given: with_name(given, kind, name))
+    check_known(kind, name)
+    return session.take_profile(f"take {profile_labels(kind, name)[name]}", kind, name)
 
 
 # The commands of a session; `stop` alone does not wait for its turn.
@@ -100,7 +108,7 @@ ACTS: dict[str, Callable[..., Any]] = {
     "redo": redo,
     "dismiss": dismiss,
     "search": search,
-    "slice": lambda session: session.slicing.slice(),
+    "slice": slice_parts,
     "compare": lambda session: session.comparing.compare(),
     "stop": Session.stop,
     "try": try_plane,

@@ -1,7 +1,7 @@
 """Planes on a bench: preparation as soon as there is a model, trials while the user drags them, and their application."""
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from hashlib import sha256
 from itertools import count
@@ -10,7 +10,7 @@ from typing import Any
 from weakref import finalize
 
 from machine.workbench.bench.bench import Bench, with_cuts, with_zones
-from machine.workbench.bench.changes import Cuts, Edit, check_unlocked, planned_part, snap
+from machine.workbench.bench.changes import Cuts, Edit, check_unlocked, snap
 from machine.workbench.bench.values import Asked, vector_of
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.work.cutting import load_kernels, make_ready, near_neck, nearest, support_uncut, try_cuts
@@ -29,6 +29,7 @@ ALIKE_MM, ALIKE_DEG = 0.01, 0.05  # differences between planes that are not repo
 REST_S = 0.1  # pause in dragging after which the planes are tried more closely
 CHANGING_S = 0.2  # pause in changes of a bench after which it is prepared
 MOST_NUMBERED = 8  # benches whose numbers are known
+Invalid = dict[PlannedPart, str]  # planes that cannot be cut, with the reasons
 _numbers = count(1)  # of the benches of all sessions, which may share processes
 
 
@@ -131,13 +132,17 @@ class Refused:
 
 class PlaneTrials:
     """trial: of the planes that were tried last, and the bench that they were tried on. refused: those that were refused last.
-    uncut: the area that needs support in one piece, mm2."""
+    uncut: the area that needs support in one piece, mm2.
+
+    A change of marks or of the machine leaves the planes on the bench. Those that can no longer be cut are invalid: they are
+    set aside in trials of the other planes, and nothing is sliced until they are moved or removed."""
 
     def __init__(self, session: SessionBase, readiness: Readiness) -> None:
         self.trial: tuple[Bench, Cuts, Trial] | None = None
         self.refused: Refused | None = None
         self._session, self._readiness = session, readiness
         self._held: Cuts | None = None  # planes that the user drags
+        self._invalid: tuple[Bench, Invalid] = session.bench, {}
         self._figures = Derived(session, self._to_try, self._try)
         self.uncut = Derived(session, self._uncut, self._try_uncut)
         session.followers.append(self.settle)
@@ -156,18 +161,27 @@ class PlaneTrials:
         """Apply planes if they can be cut. nearer: command that places the plane at the nearest position. Raises PlanError
         otherwise."""
         bench, cuts, self.refused = self._session.bench, edit.cuts, None
+        if len(cuts) + 1 < bench.parts and not self.invalid.keys() <= set(cuts):  # an invalid plane goes even if others need it
+            after = with_cuts(bench, cuts)
+            self._session.do(edit.word, after, await self.recheck(after))
+            return
+        aside: Invalid = {}
         trial = await self.attempt(bench, cuts)
+        if trial.rejected:
+            invalid = self.invalid or await self.find_invalid(bench)
+            aside = {cut: reason for cut, reason in invalid.items() if cut != edit.placed}
+            trial = await self.attempt(bench, cuts, aside=aside) if aside else trial
         if trial.rejected and edit.near:
             with self._session.waiting("looking for the nearest place that can be cut"):
-                nearby = await self._readiness.ask(nearest, bench, edit.orders)
+                nearby = await self._readiness.ask(nearest, bench, edit.orders, tuple(aside))
             if nearby is not None:
-                cuts, trial = nearby, await self.attempt(bench, nearby)
+                cuts, trial = nearby, await self.attempt(bench, nearby, aside=aside)
         if trial.rejected:
             self.settle()
             self.refused = Refused(asking.get(), trial.obstacle, None if edit.near else nearer)
             nowhere = "; shifted along its normal it cannot be cut either" if edit.near else ""
             raise PlanError(f"{edit.reason}part {trial.rejected_part} cannot be cut off: {trial.rejected}{nowhere}")
-        self.trial = bench, cuts, trial
+        self.trial = None if aside else (bench, cuts, trial)  # others may be valid without what was moved or removed
         self._session.do(edit.word, with_cuts(bench, cuts))
         (wanted, number), moved = edit.orders[0], [plane for plane in cuts if plane not in edit.cuts]
         if moved:
@@ -180,7 +194,7 @@ class PlaneTrials:
         assert bench.model is not None
         reach_mm = REACH_SHARE * hypot(*bench.model.size_mm)
         with self._session.waiting(f"looking for a neck near the plane of part {part}"):
-            neck = await self._readiness.ask(near_neck, bench, bench.cuts, part, reach_mm)
+            neck = await self._readiness.ask(near_neck, bench, bench.cuts, part, reach_mm, tuple(self.invalid))
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no section is narrower than its surroundings"
             raise PlanError(f"there is no neck near the plane of part {part}: {where}")
@@ -188,10 +202,42 @@ class PlaneTrials:
         nearer = {"do": "move", "part": part, "normal": list(normal), "offset_mm": offset_mm, "near": True}
         await self.take(snap(bench, part, PlannedPart(normal, offset_mm)), nearer)
 
-    async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf) -> Trial:
-        """The figures of planes; most_cuts: see mdp.search.trial."""
-        trial: Trial = await self._readiness.ask(try_cuts, bench, cuts, most_cuts)
+    async def attempt(self, bench: Bench, cuts: Cuts, most_cuts: float = inf, aside: Iterable[PlannedPart] = ()) -> Trial:
+        """The figures of planes; most_cuts, aside: see work.cutting.try_cuts."""
+        trial: Trial = await self._readiness.ask(try_cuts, bench, cuts, most_cuts, tuple(aside))
         return trial
+
+    @property
+    def invalid(self) -> Invalid:
+        """The planes on the bench that cannot be cut, as far as they have been tried."""
+        (tried, invalid), bench = self._invalid, self._session.bench
+        return dict(invalid) if (tried.cuts, tried.sought) == (bench.cuts, bench.sought) else {}
+
+    async def find_invalid(self, bench: Bench) -> Invalid:
+        """The planes of a bench that cannot be cut, with the reasons."""
+        invalid: Invalid = {}
+        await self._attempt_valid(bench, bench.cuts or (), inf, invalid)
+        return invalid
+
+    async def _attempt_valid(self, bench: Bench, cuts: Cuts, most_cuts: float, invalid: Invalid) -> Trial:
+        """The figures of planes, after those that are rejected are added to the invalid ones."""
+        trial = await self.attempt(bench, cuts, most_cuts, invalid)
+        for _ in cuts:
+            if not trial.rejected:
+                break
+            invalid[cuts[trial.rejected_part - 2]] = trial.rejected
+            trial = await self.attempt(bench, cuts, most_cuts, invalid)
+        return trial
+
+    async def recheck(self, bench: Bench) -> str:
+        """Find the invalid planes of a bench that comes next; returns a sentence about them, "" without any."""
+        self._invalid = bench, await self.find_invalid(bench)
+        return invalid_in_words(*self._invalid)
+
+    def unsliceable(self) -> str:
+        """Sentence on why planes on the bench keep it from being sliced; "" if they do not."""
+        words, count = invalid_in_words(self._session.bench, self.invalid), len(self.invalid)
+        return words and f"{words}: move or remove {'its plane' if count == 1 else 'their planes'}, or find parts again"
 
     def _wanted(self, bench: Bench) -> Cuts | None:
         return bench.cuts if self._held is None else self._held
@@ -206,18 +252,24 @@ class PlaneTrials:
 
     async def _try(self, bench: Bench) -> None:
         """Compute the figures at once; check the remaining parts one by one when dragging pauses."""
-        cuts = self._wanted(bench)
+        cuts, dragged = self._wanted(bench), self._held is not None
         if cuts is None:
             return
-        self.trial = tried = bench, cuts, await self.attempt(bench, cuts, 0)
-        while tried[2].unchecked:
+        aside: Invalid = self.invalid if dragged else {}
+        attempt = self.attempt if dragged else self._attempt_valid
+        trial = await attempt(bench, cuts, 0, aside)
+        while True:
+            self.trial = tried = bench, cuts, trial
+            if not dragged:
+                self._invalid = bench, aside
+            if not trial.unchecked:
+                return
             self._session.notify()
             if not await self._figures.rests(REST_S):
                 return
-            trial = await self.attempt(bench, cuts, 1)
+            trial = await attempt(bench, cuts, 1, aside)
             if self.trial is not tried:
                 return
-            self.trial = tried = bench, cuts, trial
 
     def _uncut(self, bench: Bench) -> tuple[object, ...] | None:
         """The state that determines the area that needs support in one piece; None if it is not computed automatically."""
@@ -228,33 +280,20 @@ class PlaneTrials:
         return await self._readiness.ask(support_uncut, bench)
 
     async def mark(self, word: str, marking: Callable[[Bench], Zones]) -> None:
-        """Apply other zones; removes planes that they forbid, and reports why. word: name of the history step. Raises PlanError
-        for invalid zones, and if a forbidden plane is locked."""
+        """Apply other zones; planes that they forbid stay, as invalid ones. word: name of the history step. Raises PlanError for
+        invalid zones."""
         before = self._session.bench
-        marked = with_zones(before, await self._session.quick.run(mark, before, marking))
-        bench, removed = await self.without_invalid(marked)
-        for part, reason in removed.items():
-            if planned_part(before, part) in before.locked:
-                raise PlanError(f"the plane of part {part} is locked and would be in the way: {reason}")
-        self._session.do(word, bench, removed_in_words(removed))
-
-    async def without_invalid(self, bench: Bench) -> tuple[Bench, dict[int, str]]:
-        """A bench with those of its planes that can be cut, and the reasons why others cannot, by the numbers of their parts."""
-        numbers, removed = list(range(2, bench.parts + 1)), dict[int, str]()
-        while bench.cuts:
-            trial = await self.attempt(bench, bench.cuts)
-            if not trial.rejected:
-                break
-            index = trial.rejected_part - 2
-            removed[numbers.pop(index)] = trial.rejected
-            bench = with_cuts(bench, (*bench.cuts[:index], *bench.cuts[index + 1 :]))
-        return bench, removed
+        bench = with_zones(before, await self._session.quick.run(mark, before, marking))
+        self._session.do(word, bench, await self.recheck(bench))
 
 
-def removed_in_words(removed: Mapping[int, str]) -> str:
-    """Which cuts were removed and why, as a sentence; "" for none. removed: reasons by the numbers of their parts."""
-    sentences = "; ".join(f"the cut of part {part} was removed: {reason}" for part, reason in removed.items())
-    return sentences and f"{sentences} (Undo brings {'it' if len(removed) == 1 else 'them'} back)"
+def invalid_in_words(bench: Bench, invalid: Invalid) -> str:
+    """Which parts of a bench cannot be cut off, as the beginning of a sentence, one part with its reason; "" for none."""
+    reasons = [(part, invalid[cut]) for part, cut in enumerate(bench.cuts or (), start=2) if cut in invalid]
+    if len(reasons) == 1:
+        return f"part {reasons[0][0]} cannot be cut off: {reasons[0][1]}"
+    numbers = [f"{part}" for part, _ in reasons]
+    return f"parts {', '.join(numbers[:-1])} and {numbers[-1]} cannot be cut off" if numbers else ""
 
 
 def _moved_in_words(wanted: PlannedPart, there: PlannedPart) -> str:

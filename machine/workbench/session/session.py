@@ -3,6 +3,7 @@
 import asyncio
 import shutil
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -28,16 +29,18 @@ from machine.workbench.bench.bench import (
     with_scaled_model,
 )
 from machine.workbench.bench.model import Model
-from machine.workbench.bench.settings import check_block, key_of, profile_as_given, with_given, with_typed
+from machine.workbench.bench.settings import check_block, key_of, profile_as_given, with_allowed, with_given, with_typed
+from machine.workbench.bench.values import with_value
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.session.keeping import Keeping
 from machine.workbench.session.long_work import Comparing, Finding, Slicing, price_by_hand, prices_of
-from machine.workbench.session.planes import PlaneTrials, Readiness, removed_in_words, resting_of, standing_of
+from machine.workbench.session.planes import PlaneTrials, Readiness, resting_of, standing_of
 from machine.workbench.work.cutting import draw_pieces, measure_plan
 from machine.workbench.work.folders import files_in, new_folder
 from machine.workbench.work.models import Unscaled, read_model
 from machine.workbench.work.slices import Sliced, open_gcode
 from machine.workbench.work.worker_pool import WorkerPools
+from mdp.decomposition import FrontRow
 from mdp.model_file import locate, plan_beside
 from mdp.pose import turned_by
 from mdp.read import MANY_FACES
@@ -45,7 +48,7 @@ from mdp.search.plan_file import PlanFile, planned_parts
 from mdp.search.plan_reading import read_plan
 from mdp.zone import NO_ZONES
 from profiles.effect import effect_of_change
-from profiles.errors import MeshError, PlanError
+from profiles.errors import MeshError, PlanError, UserError
 from profiles.frozen import Effect
 from profiles.profile import Profile
 
@@ -253,7 +256,12 @@ class Session(SessionBase):
             bench = with_rotation(uncut, project.rotation)
             if plan is not None:
                 marks = NO_ZONES if project.marks_in_plan else bench.zones
-                rows = await self.quick.run(measure_plan, uncut, plan)
+                rows: tuple[FrontRow, ...] = ()
+                try:
+                    rows = await self.quick.run(measure_plan, uncut, plan)
+                except UserError:
+                    if not await self.trials.find_invalid(with_plan(uncut, plan, (), profile)):
+                        raise  # else they were invalid when it was saved
                 bench = with_rotation(with_plan(uncut, plan, rows, with_plan_settings(profile, plan)), project.rotation)
                 bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
         bench = bench if project.parts else replace(bench, cuts=None)
@@ -289,21 +297,28 @@ class Session(SessionBase):
             return await self.quick.run(task, self.bench, *given)
 
     async def _draw_pieces(self, bench: Bench) -> Path:
-        """The parts as separate bodies, packed by `work.pieces`. Raises UserError if they cannot be cut."""
+        """The parts as separate bodies, packed by `work.pieces`; an empty file if they cannot be cut, as the trials report."""
         out, before = self.new_file(), self.pieces.done
-        await self.quick.run(draw_pieces, bench, out)
+        out.touch()
+        with suppress(UserError):
+            await self.quick.run(draw_pieces, bench, out)
         if before is not None and not self.pieces.stale:
             before.unlink(missing_ok=True)
         return out
 
-    async def take_given(self, word: str, change: Callable[[Given], Given], key: str = "") -> None:
-        """Change profile names and settings. key: the one that is set. Raises UserError."""
+    async def take_given(self, word: str, change: Callable[[Given], Given], key: str = "", lost: str = "") -> None:
+        """Change profile names and settings. key: the one that is set; lost: see `do`. Raises UserError."""
         before = self.bench
         given = change(before.given)
         check_block(profile_as_given(given, before.profile), key)
-        bench, refused = await self._with_profile(before, given)
+        bench, invalid = await self._with_profile(before, given)
         if given != before.given:
-            self.do(word, bench, refused)
+            self.do(word, bench, "; ".join(filter(None, (invalid, lost))))
+
+    async def take_profile(self, word: str, kind: str, name: str) -> None:
+        """Choose another machine, material or process with the settings that it allows. Raises UserError."""
+        given, lost = with_allowed(with_value(self.bench.given, kind, name), self.bench.profile)
+        await self.take_given(word, lambda _: given, lost=lost)
 
     def unless_stopped(self, name: str, begin: Callable[[], object]) -> Callable[[], None]:
         """Wrap a command that begins long work; the result does nothing if work is stopped while it waits for its turn."""
@@ -339,8 +354,8 @@ class Session(SessionBase):
         return tell
 
     async def _with_profile(self, before: Bench, given: Given) -> tuple[Bench, str]:
-        """A bench with another profile; planes that it forbids go, and a sentence says why; so do rows of the front that
-        cannot be cut at another place on the plate, and a model that it scales or turns otherwise is read again."""
+        """A bench with another profile, and a sentence about planes that cannot be cut with it. Rows of the front go that cannot
+        be cut at another place on the plate, and a model that it scales or turns otherwise is read again."""
         bench, model = with_profile(before, given, profile_as_given(given, before.profile)), before.model
         new, old = bench.profile.process, before.profile.process
         if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
@@ -358,8 +373,7 @@ class Session(SessionBase):
             bench = replace(bench, rows=tuple(rows), recommended=bench.recommended if rows else 0)
         if bench.cuts is None or effect < Effect.REACH:
             return bench, ""
-        bench, removed = await self.trials.without_invalid(bench)
-        return replace(bench, cuts=None) if removed and not bench.cuts else bench, removed_in_words(removed)
+        return bench, await self.trials.recheck(bench)
 
     async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None, asks: bool = False) -> Model:
         """The model of a file, whose mesh file exists as long as the model. asks: ask the page for the unit if the size suggests

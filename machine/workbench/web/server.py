@@ -355,7 +355,8 @@ async def _facets(session: Session, request: Request) -> Response:
 
 
 async def _pieces(session: Session, request: Request) -> Response:
-    return FileResponse(await session.pieces.get(), media_type=BYTES)
+    path = await session.pieces.get()
+    return FileResponse(path, media_type=BYTES) if path.stat().st_size else Response(status_code=204)
 
 
 async def _marks(session: Session, request: Request) -> Response:

@@ -31,7 +31,7 @@ from mdp.search.trial import Trial
 from mdp.zone import AnyZone, Brushed, MeshVolume, Modifier, Zone
 from profiles.machine import Table
 from profiles.material import Material
-from profiles.messages import advice, option, settings_in, terminal_words
+from profiles.messages import advice, keys_in, option, settings_in, terminal_words
 from profiles.places import OF_KIND
 from profiles.profile import Profile
 
@@ -132,13 +132,13 @@ def _sliced(session: Session) -> dict[str, Any] | None:
         "stale": session.slicing.out_of_date,
         "ready": sorted(slices.walls),
         "told": [
-            ("takes", duration(sliced.time_s)),
+            ("print time", duration(sliced.time_s)),
             ("filament", f"{sliced.filament_mm / 1000.0:.2f} m, {filament_g(sliced.filament_mm, profile.material):.1f} g"),
-            *([("costs", costs)] if costs else []),
+            *([("cost", costs)] if costs else []),
         ],
         "verdict": verdict_of(sliced.findings, profile, sliced.cost.risky_mm2, out_of_date=session.slicing.out_of_date),
         "joints": [_joint(joint) for joint in sliced.cost.joints],
-        "findings": [asdict(finding) for finding in sliced.findings[:MOST_FINDINGS]],
+        "findings": [asdict(each) | {"keys": ", ".join(keys_in(each.message))} for each in sliced.findings[:MOST_FINDINGS]],
         "more_findings": max(len(sliced.findings) - MOST_FINDINGS, 0),
         "errors": [error.message for error in sliced.errors[:MOST_FINDINGS]],
     }
@@ -167,6 +167,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "busy": session.busy,
         "note": session.note,
         "preparing": bool(session.readiness.progress),
+        "unsliceable": _unsliceable(session),
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "savable": _savable(session),
         **_steps(session.history),
@@ -183,6 +184,14 @@ def snapshot(session: Session) -> dict[str, Any]:
         "benches": session.benches,
         "kept": session.keeping.released,
     }
+
+
+def _unsliceable(session: Session) -> str:
+    """Why what is on the bench cannot be sliced, as far as it is known; "" if it can."""
+    bench, standing = session.bench, session.standing.result
+    if (invalid := session.trials.unsliceable()) or standing is None:
+        return invalid
+    return standing.copies_problem or ("" if bench.cuts else standing.problem)
 
 
 def _steps(history: History) -> dict[str, Any]:
@@ -226,6 +235,7 @@ def _parts_state(session: Session) -> dict[str, Any]:
         "recommended": bench.recommended,
         "cuts": _cuts(bench.cuts or ()),
         "locked": [part in bench.locked for part in bench.cuts or ()],
+        "invalid": [session.trials.invalid.get(part, "") for part in bench.cuts or ()],
         "trial": _trial(session),
         "refused": _refused(session),
         "colours": page_colours(max([bench.parts, len(planes) + 1, *(row.parts for row in bench.rows)])),

@@ -156,7 +156,7 @@ class Uploads:
             return False
         copy = str(shutil.copy(path, self._profiles.new_file(path.name)))
         try:
-            await session.take_given(f"take {path.name}", lambda given: with_value(given, kind, copy))
+            await session.take_profile(f"take {path.name}", kind, copy)
         except ProfileError as error:
             remove_file(Path(copy))
             raise ProfileError(f"{error}".replace(f"{Path(copy).parent}{os.sep}", "")) from None

@@ -285,9 +285,9 @@ def load_kernels(tell: Tell) -> None:
     Trials(convex_hull(corners), load()).warm()
 
 
-def try_cuts(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], most_cuts: float) -> Trial:
-    """Try planes; most_cuts: see mdp.search.trial."""
-    return _trials(number, bench).attempt(_planes(cuts), most_cuts)
+def try_cuts(tell: Tell, number: int, bench: Bench, cuts: Cuts, most_cuts: float, aside: Cuts = ()) -> Trial:
+    """Try planes; most_cuts: see mdp.search.trial; aside: those that are cut without a check."""
+    return _trials(number, bench, aside).attempt(_planes(cuts), most_cuts)
 
 
 def support_uncut(tell: Tell, number: int, bench: Bench) -> float:
@@ -295,15 +295,15 @@ def support_uncut(tell: Tell, number: int, bench: Bench) -> float:
     return _trials(number, bench).uncut_support_mm2
 
 
-def near_neck(tell: Tell, number: int, bench: Bench, cuts: tuple[PlannedPart, ...], part: int, reach_mm: float) -> Plane | None:
-    """The neck near the plane of a part, from `Trials.neck`."""
-    return _trials(number, bench).neck(_planes(cuts), part, reach_mm)
+def near_neck(tell: Tell, number: int, bench: Bench, cuts: Cuts, part: int, reach_mm: float, aside: Cuts = ()) -> Plane | None:
+    """The neck near the plane of a part, from `Trials.neck`; aside: see try_cuts."""
+    return _trials(number, bench, aside).neck(_planes(cuts), part, reach_mm)
 
 
-def nearest(tell: Tell, number: int, bench: Bench, orders: list[tuple[Cuts, int]]) -> Cuts | None:
+def nearest(tell: Tell, number: int, bench: Bench, orders: list[tuple[Cuts, int]], aside: Cuts = ()) -> Cuts | None:
     """Among several print orders the planes that can be cut with the least shift of one part's plane, from `Trials.nearest`; None
-    if there are none. orders: planes, each with the number of that part."""
-    trials, best = _trials(number, bench), None
+    if there are none. orders: planes, each with the number of that part; aside: see try_cuts."""
+    trials, best = _trials(number, bench, aside), None
     for cuts, part in orders:
         wanted, plane = cuts[part - 2].plane, trials.nearest(_planes(cuts), part)
         if plane is None or wanted is None:
@@ -315,7 +315,7 @@ def nearest(tell: Tell, number: int, bench: Bench, orders: list[tuple[Cuts, int]
     return None if best is None else best[1]
 
 
-def _trials(number: int, bench: Bench) -> Trials:
+def _trials(number: int, bench: Bench, aside: Cuts = ()) -> Trials:
     global _ready
     if _ready is None or _ready[0] != number:
         _ready = None  # two at once would need too much memory
@@ -325,6 +325,7 @@ def _trials(number: int, bench: Bench) -> Trials:
         trials = Trials(mesh, bench.profile, zones)
         trials.warm()
         _ready = number, trials
+    _ready[1].set_aside(_planes(aside))
     return _ready[1]
 
 

@@ -129,6 +129,32 @@ def test_a_pause_is_shown_at_once_though_it_begins_after_the_stroke_under_way(pa
     assert [progress.state for progress in paused.shown[asked : asked + 2]] == ["printing", "pausing"]
 
 
+def test_a_pause_that_is_wanted_while_the_printer_heats_says_that_it_begins_once_it_is_hot() -> None:
+    watcher = watched({7: Command.PAUSE, "paused": Command.RESUME})  # line 8 waits for the bed
+    watcher.run(PROGRAM)
+    told = [progress.message for progress in watcher.shown if progress.state == "pausing"]
+    assert "it pauses once it is hot" in told[:2]  # at once
+    assert set(told) <= {"", "it pauses once it is hot"}
+    (paused, *_) = [progress for progress in watcher.shown if progress.state == "paused"]
+    assert paused.message == ""
+
+
+def test_a_pause_that_is_wanted_before_the_nozzle_is_hot_waits_for_it_so_that_no_filament_is_pulled_cold() -> None:
+    watcher = watched({5: Command.PAUSE, "paused": Command.RESUME})  # line 5 sets the nozzle and does not wait
+    assert not watcher.run(PROGRAM).cancelled
+    (paused, *_) = [progress for progress in watcher.shown if progress.state == "paused"]
+    assert paused.temperature.nozzle_c >= 190.0
+    assert "it pauses once it is hot" in [progress.message for progress in watcher.shown if progress.state == "pausing"][:2]
+
+
+def test_the_targets_of_a_cancelled_print_are_off_as_soon_as_the_printer_has_said_so() -> None:
+    watcher = watched({150: Command.CANCEL})
+    assert watcher.run(PROGRAM).heaters_off
+    before, after = (progress.temperature for progress in (watcher.shown[-2], watcher.shown[-1]))
+    assert (before.nozzle_target_c, before.bed_target_c) == (200.0, 60.0)
+    assert (after.nozzle_target_c, after.bed_target_c) == (0.0, 0.0)
+
+
 def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_aside(paused: Watcher) -> None:
     lines = paused.lines()
     stop = lines.index("M400")

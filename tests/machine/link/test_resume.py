@@ -644,9 +644,11 @@ def test_the_command_lists_the_prints_that_can_be_resumed_and_no_others(
             journal.write(state)
     (journal.path.parent / "torn.journal").write_bytes(b"nothing")
     assert main(["resume"]) == 0
-    path, summary = capsys.readouterr().out.splitlines()
+    head, row = (re.split("  +", line) for line in capsys.readouterr().out.splitlines())
+    assert head == ["print", "machine", "up to line", "interrupted", "journal"]
+    assert row[:3] == ["cut-off", "generic A/C table", "10"]
+    path = row[-1]
     assert path.endswith("-cut-off.journal")
-    assert summary.startswith("    cut-off on generic A/C table, up to line 10, ")
     assert main(["resume", path]) == 1
     assert capsys.readouterr().err.endswith("at which port is the printer? --port PORT is expected\n")
 

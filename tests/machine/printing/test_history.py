@@ -13,7 +13,7 @@ from machine.link.print_state import PrintState
 from machine.pipeline.programs import LoadedProgram
 from machine.printing import history
 from machine.printing.history import FOLDER, MOST_PRINTS, past_prints, recorded
-from machine.printing.job import CANCELLED, DONE, NOT_BEGUN, End
+from machine.printing.job import DONE, NOT_BEGUN, End
 from machine.program import Program
 from profiles.errors import PrinterError
 from profiles.files import lock
@@ -42,7 +42,8 @@ def printed(name: str, act: Callable[[], End]) -> End:
 
 def test_prints_are_listed_with_outcome_duration_and_filament_the_newest_first() -> None:
     assert printed("vase", lambda: DONE) is DONE
-    assert printed("bracket", lambda: CANCELLED) is CANCELLED
+    cancelled = End(PrintState.CANCELLED)
+    assert printed("bracket", lambda: cancelled) is cancelled
     assert printed("unwanted", lambda: NOT_BEGUN) is NOT_BEGUN
     assert past_prints() == [
         {"name": "bracket", "port": "sim", "outcome": "cancelled", "begun": 2000.0, "seconds": 5.0, "filament_m": None},

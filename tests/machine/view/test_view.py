@@ -226,6 +226,14 @@ def test_a_finding_stands_at_its_line() -> None:
     assert mistake["machine_mm"] == [9999.0, 0.0, 0.0]
 
 
+def test_a_finding_names_settings_by_their_labels_and_keeps_their_keys() -> None:
+    profile, lines = load(settings=['machine.uncalibrated=["machine.table", "machine.tilt.point_mm"]']), ("G28", "G1 X1 F600")
+    header, _ = unpacked(of_print("text", Program(lines, dry_run(lines, profile), None), profile, True, (), False))
+    (guess,) = [finding for finding in header["findings"] if finding["code"] == "uncalibrated"]
+    assert guess["message"].endswith(": Table, Tilt axis: Point on the axis")
+    assert guess["keys"] == "machine.table, machine.tilt.point_mm"
+
+
 def test_a_finding_about_another_layer_stands_where_that_begins() -> None:
     text = ";PART:1\n;UNSUPPORTED:3@2\n;LAYER_CHANGE\nG1 Z0.2 F600\nG1 X9 E1\n;LAYER_CHANGE\nG0 Z0.4\nG1 X0 E2"
     header, columns = read(text)

@@ -82,8 +82,8 @@ def test_the_plate_has_millimetres_on_it_and_the_front_before_it() -> None:
     act = """const { bodiesOf } = modules["picture/shapes"], head = { silhouette_mm: [[1, 0], [5, 9]], boxes: [] };
     return tables.map((table) => [...bodiesOf({ table, cradle: [], head }, false).table.lines.places]);"""
     round_plate, rectangle = (
-        {"radius_mm": 100.0, "thickness_mm": 5.0},
-        {"size_mm": [200.0, 100.0], "radius_mm": 112.0, "thickness_mm": 5.0},
+        {"radius_mm": 100.0, "thickness_mm": 5.0, "clips": []},
+        {"size_mm": [200.0, 100.0], "radius_mm": 112.0, "thickness_mm": 5.0, "clips": []},
     )
     lines = run(TEMPLATE / "picture" / "shapes.js", act, tables=[round_plate, rectangle])
     ends = [np.reshape(places, (-1, 2, 3)) for places in lines]
@@ -92,3 +92,13 @@ def test_the_plate_has_millimetres_on_it_and_the_front_before_it() -> None:
         assert abs(front[:, :, 0].mean()) < 1.5  # FRONT stands before the middle
     ticks = {round(float(-a[1]), 2) for a, b in ends[0] if a[0] == 0.0 and a[1] == b[1] <= 0.0 < b[0] < 1.0}
     assert ticks == {4.0 * k for k in range(26)}
+
+
+def test_clips_are_drawn_where_they_stand_on_the_plate() -> None:
+    act = """const { bodiesOf } = modules["picture/shapes"], head = { silhouette_mm: [[1, 0], [5, 9]], boxes: [] };
+    return [...bodiesOf({ table, cradle: [], head }, false).table.solid.places];"""
+    clips = [{"name": "clip", "min_mm": [-10.0, 80.0, 0.0], "max_mm": [10.0, 95.0, 6.0]}]
+    table = {"radius_mm": 100.0, "thickness_mm": 5.0, "clips": clips}
+    corners = np.reshape(run(TEMPLATE / "picture" / "shapes.js", act, table=table), (-1, 3))
+    above = corners[corners[:, 2] > 0.0]
+    assert (above.min(axis=0).tolist(), above.max(axis=0).tolist()) == ([-10.0, 80.0, 6.0], [10.0, 95.0, 6.0])

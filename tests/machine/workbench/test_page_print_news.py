@@ -60,7 +60,19 @@ def test_how_a_print_is_stands_on_the_tab_and_in_the_bar_of_every_tab() -> None:
         f"{PAGE} tell('printing', 0.5, {{ how: 'printing, 50 %', texts: {{ 'run-news': 'box: printing' }} }});"
         " return ['run-state', 'bar-told', 'run-news'].map((id) => $(id).textContent);"
     )
-    assert told == ["printing, 50 %", "box at sim: printing, 50 %", "box: printing"]
+    assert told == ["printing, 50 %", "box on sim: printing, 50 %", "box: printing"]
+
+
+@needs_node
+def test_heaters_that_are_proved_off_are_told_as_off_and_not_as_a_warning_and_no_sentence_twice() -> None:
+    told = on_fake_page(
+        f"{PAGE} const sentence = 'the print was cancelled; heaters off', lines = ['tiltprint: ' + sentence, 'other'];"
+        " tell('cancelled', 0.1, { is_over: true, nozzle_target_c: 0, heat_is_old: true, sentence, said: lines });"
+        " const texts = (id) => $(id).children.map((each) => [each.textContent, each.className]);"
+        " return [texts('run-told').slice(1, 4), texts('run-said')];"
+    )
+    assert told[0] == [["off, 200.0 °C (0 s ago)", None], ["bed", None], ["60.0 °C, as last known 0 s ago", "old"]]
+    assert [text for text, _ in told[1]] == ["other"]
 
 
 @needs_node

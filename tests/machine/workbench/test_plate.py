@@ -140,6 +140,7 @@ def test_a_model_opened_over_another_one_can_be_put_beside_it_instead(bench: Run
         page.do("beside", number=1, count=900)
         told = page.until(lambda state: state["copies_told"].startswith("box.stl measures 16.0 x 16.0 mm"))["copies_told"]
         assert "no room for it" in told
+        assert page.state["unsliceable"] == told  # the page shows it beside the button that slices, on every tab
         page.do("undo")
         page.until(lambda state: state["copies_told"] == "All 2 stand on the plate.")
 

@@ -346,7 +346,7 @@ def test_copies_and_pauses_are_the_command_line_s_and_their_sentences_name_field
         page.until(lambda state: (state["copies"], state["stops"]) == (1, []))
 
 
-def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbids(bench: Running, folder: Path) -> None:
+def test_another_machine_keeps_all_planes_and_tells_which_it_cannot_cut(bench: Running, folder: Path) -> None:
     (folder / "tee.stl").write_bytes(stl(tee()))
     with bench.line() as page:
         bench.send(folder / "tee.stl")
@@ -357,9 +357,11 @@ def test_a_setting_changes_the_bench_and_is_undone_with_the_planes_that_it_forbi
         page.do("set", key="process.walls", value="400")
         assert "Walls is 400" in page.until(lambda state: state["problem"])["problem"]
         page.do("profile", kind="machine", name="three_axis")
-        gone = page.until(lambda state: state["given"]["machine"] == "three_axis" and state["note"])
-        assert ([cut["offset_mm"] for cut in gone["cuts"]], gone["problem"]) == ([20.0], "")
-        assert gone["note"].startswith("the cut of part 3 was removed: ")
+        kept = page.until(lambda state: state["given"]["machine"] == "three_axis" and state["note"])
+        assert ([cut["offset_mm"] for cut in kept["cuts"]], kept["problem"]) == ([20.0, 8.0], "")
+        assert bench.ask("pieces") == (204, b"")
+        assert (page.state["problem"], kept["invalid"][0]) == ("", "")
+        assert kept["note"] == f"part 3 cannot be cut off: {kept['invalid'][1]}"
         page.do("undo")
         page.until(lambda state: state["parts"] == 3 and state["given"]["machine"] == "generic_ac")
         page.do("set", key="process.scale", value="2")

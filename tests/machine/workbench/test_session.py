@@ -365,7 +365,7 @@ def test_a_plane_that_is_refused_is_put_at_the_nearest_place_when_that_is_asked_
     assert (session.bench.cuts, session.problem) == ((PlannedPart(UP, 30.0),), "")
 
 
-def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_and_undo_brings_it_back() -> None:
+def test_at_another_place_planes_that_the_machine_does_not_reach_stay_as_invalid_ones_and_slicing_is_refused() -> None:
     low, high = (Plane(np.array(UP), offset_mm) for offset_mm in (5.0, 25.0))
     rows = (FrontRow((), 9.0, 0.0, 9.0), FrontRow((low,), 1.0, 2.0, 3.0), FrontRow((low, high), 1.0, 1.0, 2.0, chosen=True))
 
@@ -373,7 +373,8 @@ def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_a
         async def answer(task: Any, *given: Any, **more: Any) -> Any:
             if task.__name__ != "try_cuts":
                 return Standing((40.0, 8.0, 40.0), 0.0, "") if task.__name__ == "stand" else None
-            far = [part for part, cut in enumerate(given[2], start=2) if cut.offset_mm > 20.0]
+            aside = given[4] if len(given) > 4 else ()
+            far = [part for part, cut in enumerate(given[2], start=2) if cut.offset_mm > 20.0 and cut not in aside]
             is_there = given[1].profile.process.place_mm[0] > 50.0 and far
             return Trial((), far[0], "Z would go too far") if is_there else Trial(())
 
@@ -386,12 +387,41 @@ def test_at_another_place_what_the_machine_does_not_reach_goes_with_the_reason_a
             obey(session, {"do": "set", "key": "process.place_mm", "value": f"[{x}, 0]"})
             await settled(session)
             cut.append((session.bench.parts, len(session.bench.rows), session.note))
+        obey(session, {"do": "slice"})
+        await settled(session)
+        cut.append((session.bench.parts, session.slicing.number, session.problem))
         obey(session, {"do": "undo"})
 
     cut: list[tuple[int, int, str]] = []
     session = when_done(work)
-    assert cut == [(3, 3, ""), (2, 2, "the cut of part 2 was removed: Z would go too far (Undo brings it back)")]
+    why = "part 2 cannot be cut off: Z would go too far"
+    assert cut == [(3, 3, ""), (3, 2, why), (3, 0, f"{why}: move or remove its plane, or find parts again")]
+    assert session.trials.invalid == {}
     assert (session.bench.parts, session.bench.profile.process.place_mm) == (3, (30.0, 0.0))
+
+
+def test_an_invalid_plane_is_removed_even_if_another_one_is_invalid_without_it() -> None:
+    low, high = PlannedPart(UP, 5.0), PlannedPart(UP, 25.0)
+
+    async def work(session: Session) -> None:
+        async def answer(task: Any, *given: Any, **more: Any) -> Any:
+            if task.__name__ != "try_cuts":
+                return Standing((40.0, 8.0, 40.0), 0.0, "") if task.__name__ == "stand" else None
+            cuts, aside = given[2], given[4]
+            if high in cuts:
+                return Trial(()) if high in aside else Trial((), 3, "it is marked")
+            return Trial(()) if low in aside else Trial((), 2, "a sliver stays")
+
+        session.hand.run = answer  # type: ignore[method-assign]
+        session.do("cut", replace(session.bench, cuts=(low, high)))
+        await settled(session)
+        assert session.trials.invalid == {high: "it is marked"}
+        obey(session, {"do": "remove", "part": 3})
+        await settled(session)
+
+    session = when_done(work)
+    assert (session.bench.cuts, session.problem) == ((low,), "")
+    assert session.note == "part 2 cannot be cut off: a sliver stays"
 
 
 def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is_done() -> None:

@@ -14,12 +14,13 @@ from machine.planning.stops import parse_stops
 from machine.workbench.bench.bench import USUAL, Bench, History, Step, with_cuts, with_model_turned_as_read
 from machine.workbench.bench.settings import (
     check_block,
+    check_known,
     export_command,
     profile_as_given,
     profile_labels,
     settings_list,
     turns_deg,
-    with_name,
+    with_allowed,
     with_setting,
     with_typed,
     without_settings,
@@ -135,9 +136,18 @@ def test_what_is_set_is_marked_and_goes_back() -> None:
 
 
 def test_another_machine_is_taken_by_its_name_and_an_unknown_one_refused() -> None:
-    assert profile_as_given(with_name(USUAL, "machine", "fractal5pro"), load()).machine.name != load().machine.name
+    check_known("machine", "fractal5pro")
     with pytest.raises(ProfileError, match=r"'/etc/passwd' is no machine: .*generic_ac.* are known"):
-        with_name(USUAL, "machine", "/etc/passwd")
+        check_known("machine", "/etc/passwd")
+
+
+def test_another_machine_keeps_the_settings_that_it_allows_and_names_the_others() -> None:
+    typed = ("process.walls=4", "machine.tilt.limits_deg=[-100, 100]", "machine.clearance_mm=3")
+    allowed = Given(machine="open5x_jubilee", settings=("process.walls=4", "machine.clearance_mm=3"))
+    assert with_allowed(allowed, load()) == (allowed, "")
+    kept, lost = with_allowed(replace(allowed, settings=(*typed, "process.layer_height_mm=5")), load())
+    assert kept.settings[-1:] == ("machine.clearance_mm=3",)
+    assert terminal_words(lost) == "process.layer_height_mm is as in the profile, which does not allow your value"
 
 
 def test_a_value_out_of_range_is_the_command_line_s_sentence() -> None:

@@ -5,10 +5,12 @@ import numpy as np
 import pytest
 
 from mdp.mesh import Mesh
+from mdp.overhang import UP
 from mdp.plane import Plane
 from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.search import SearchRequest, cut_by_plan
 from mdp.search.trial import Trials
+from mdp.zone import Zone, Zones
 from profiles.messages import terminal_words
 from profiles.profile import load
 from tests.shapes import box, hollow_tee, standing, tee
@@ -169,3 +171,17 @@ def test_where_no_level_plane_can_be_cut_the_nearest_one_leans() -> None:
 def test_where_other_planes_are_refused_no_place_helps() -> None:
     outside = Plane(np.array([1.0, 0.0, 0.0]), 25.0)
     assert trials(tee()).nearest((Plane(np.array([0.0, 0.0, 1.0]), 30.0), outside), 2) is None
+
+
+def test_a_plane_set_aside_is_cut_all_the_same_so_that_the_planes_after_it_are_tried_on_what_it_leaves() -> None:
+    plane, higher = Plane(UP, 20.0), Plane(UP, 27.0)
+    kept = Trials(tee(), PROFILE, Zones(keep=(Zone((-2.0, -2.0, 26.0), (2.0, 2.0, 28.0)),)))
+    assert (
+        terminal_words(kept.attempt((plane, higher)).rejected)
+        == "its plane would pass through zone 1 of [[keep]], which stays whole"
+    )
+    kept.set_aside([higher])
+    tried, free = kept.attempt((plane, higher)), Trials(tee(), PROFILE).attempt((plane, higher))
+    assert (tried.rejected, tried.parts) == ("", free.parts)
+    kept.set_aside([])
+    assert kept.attempt((plane, higher)).rejected_part == 3

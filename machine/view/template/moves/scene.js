@@ -8,7 +8,7 @@ export function sceneOf(print, bells) {
   const scene = {
     row: last, share: 1, place: restingPlace(header),
     part: null, others: "faint", low: 0, high: Math.max(rows.layers.length - 1, 0),
-    riding: false, dark: false, mode: usualMode(print), hidden: new Set(),
+    riding: false, dark: false, mode: header.types.length > 2 ? "kind" : "part", hidden: new Set(),
     model: rows.count ? "ghost" : "solid", risky: "printed", apart: 0, tried: null, section: null,
     on: { beads: true, travels: false, retractions: false, seams: false, machine: header.machine.known, planes: false, directions: false, findings: true },
   };
@@ -65,9 +65,6 @@ export function sceneOf(print, bells) {
   };
   return scene;
 }
-
-/** By what the beads are coloured at first: what tells most of them apart. */
-const usualMode = ({ header }) => (header.parts.length < 2 && header.types.length > 2 ? "kind" : "part");
 
 /** Without a path the machine waits, level or as for a part, the head well above everything. */
 function restingPlace({ machine, parts }, { tilt_deg: tilt = machine.tilt.zero_deg, turn_deg: turn = machine.turn.zero_deg } = {}) {

@@ -1,13 +1,14 @@
 // Controls: what is coloured how, what is shown and what is not; the legend; dark and light.
 
-import { $, duration, listen, made, numberIn, optionsOf, partsInWords, swatch, swatches, tabsOf, tell, toggle } from "../elements.js";
+import { $, duration, keptIn, listen, made, numberIn, optionsOf, partsInWords, swatch, swatches, tabsOf, tell, toggle } from "../elements.js";
 import { RAMP, typeColour } from "../moves/colours.js";
 import { KIND } from "../moves/rows.js";
 import { mix } from "../picture/math.js";
 import { hex, sectionAsked } from "../picture/shapes.js";
 
 export function controlsOf(print, scene, bells) {
-  const { parts } = print.header, posed = parts.filter((part) => part.base);
+  const { rows, header: { parts } } = print, kept = keptIn("localStorage", "colour by", { mode: scene.mode }), posed = parts.filter((part) => part.base);
+  if ([...$("colour-by").options].some(({ value }) => value === kept.now.mode)) scene.mode = kept.now.mode; // of the print before
   for (const name of Object.keys(scene.on)) {
     const box = $(`show-${name}`);
     box.checked = scene.on[name];
@@ -16,7 +17,7 @@ export function controlsOf(print, scene, bells) {
   const choices = { "colour-by": ["mode", "colours"], others: ["others", "look"], model: ["model", "look"], risky: ["risky", "model"] };
   for (const [id, [key, bell]] of Object.entries(choices)) {
     if (["mode", "model"].includes(key)) $(id).value = scene[key];
-    listen("change", { [id]: () => { scene[key] = $(id).value; bells.ring(bell); } });
+    listen("change", { [id]: () => { scene[key] = $(id).value; kept.keep({ mode: scene.mode }); bells.ring(bell); } });
   }
   $("stand").append(...optionsOf(posed.map(({ index }) => [index, `part ${index}`])));
   listen("change", {
@@ -27,11 +28,11 @@ export function controlsOf(print, scene, bells) {
   listen("change", { "section-along": cut, "section-flip": cut });
   listen("input", { "section-at": cut });
   listen("input", { apart: () => { scene.apart = numberIn("apart"); bells.ring("look"); } });
-  toggle(print.rows.count ? "has-paths" : "no-paths", true);
+  toggle(rows.count ? "has-paths" : "no-paths", true);
   toggle("no-solids", !print.surfaces && !posed.length);
   toggle("one-part", parts.length < 2);
   typeBoxes(print, scene, bells);
-  tabsOf((panel) => toggle("reporting", panel === "report"));
+  tabsOf();
 }
 
 /** A box for every kind of line in the print, with its share of the time. */

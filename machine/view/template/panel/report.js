@@ -54,7 +54,7 @@ function sectionOf({ title, head, rows, notes, folded }) {
   const wordy = head.map((_, k) => rows.some((cells) => cells[k].length > WORDY));
   const row = (tag, cells) => made("tr", {}, ...cells.map((text, k) => made(tag, { text, className: wordy[k] ? "words" : "" })));
   const table = made("table", {}, made("thead", {}, row("th", head)), made("tbody", {}, ...rows.map((cells) => row("td", cells))));
-  const content = [...(rows.length ? [made("div", { className: "table" }, table)] : []), ...notes.map(noteOf)];
+  const content = [...(rows.length ? [made("div", { className: "table", tabIndex: 0 }, table)] : []), ...notes.map(noteOf)];
   return folded ? made("details", {}, made("summary", { text: title }), ...content) : made("section", {}, made("h2", { text: title }), ...content);
 }
 

@@ -37,6 +37,7 @@ function main() {
   tabsOf((tab) => update({ tab }));
   const restoreLook = keptLook(camera, picture);
   onState(tellState);
+  subscribe(({ state: { model, gcode }, looking, tab }) => tellTitle({ name: (gcode && (looking === "gcode" || tab === "printing") ? gcode : model)?.name || "" }));
   subscribe((now, before) => { if (now.line !== before.line) onlyWithLine(now.line === "open"); });
   onState(({ note }) => notice(note, "note"));
   slicesPanel(printFrame(camera, picture));
@@ -64,9 +65,8 @@ function main() {
 
 function tellState({ model, busy, undo, redo, search, slicing, comparing, preparing, machine, material, process }) {
   const root = document.documentElement;
-  tellTitle({ model: model ? model.name : "" });
   const summary = busy ? `${busy} …` : search ? `finding parts: ${search.text}` : slicing ? slicing.text : comparing || (preparing ? "preparing the model for planes …" : `${machine.name} · ${material} · ${process}`);
-  tell({ title: model ? model.name : "tiltprint", summary });
+  tell({ summary });
   hide({ drop: Boolean(model || busy) });
   root.dataset.busy = busy;
   root.toggleAttribute("data-searching", Boolean(search));
@@ -83,7 +83,7 @@ const onlyWithLine = (open) => document.querySelectorAll("fieldset:is(.linked, :
 function problemLine() {
   onState(({ problem, refused, units }) => {
     putNew($("problem"), problem, () => withWholeOptions(problem)); // read aloud once
-    hide({ problem: !problem, "put-near": !refused?.near, "put-aside": !refused });
+    hide({ problem: !problem, "put-aside": !refused });
     putNew($("units"), units?.words || [], () => (units?.words || []).map((unit) => button(`in ${unit}`, () => send({ do: "unit", unit }))));
   });
 }

@@ -1,5 +1,7 @@
 // Store: the state of the page, changed by update() alone. A panel subscribes to what it shows.
 
+import { keptIn } from "../../../view/template/elements.js";
+
 /** state: the server's; line: status of the connection, a key of LINE_STATUS; tab: the open one; triangles: of the model; turning, placing, hand, zoneHand: rotation, place, plane and box while they are dragged; seen: {size_mm} of the drawn model.
  * clicks: use of the next click on the model, a key of WANTED; part, zone: the chosen ones, 0 and null: none; corner: the first one of a box; facets: of the hull, and the highlighted one; figures: of the planes on the bench; row: of the front while its slider is dragged.
  * pieces, apart: the parts as bodies, and their distance in the exploded view; faceMarks, pedestal, others, walls: as received; looking: the print is shown, "gcode": the open G-code file. */
@@ -37,17 +39,8 @@ export function onNew(pick, changed) {
 /** listener(state, the one before): for every new state. */
 export const onState = (listener) => subscribe((now, before) => { if (now.state !== before.state) listener(now.state, before.state); });
 
-/** now: an object, at first what was kept or usual has; keep(changes) changes it. Where a browser keeps nothing, a reload forgets. */
-export function keptInTab(name, usual) {
-  const key = `${name} ${location.pathname}`, kept = { now: { ...usual } };
-  const attempt = (act) => { try { act(); } catch { /* nothing is kept here */ } };
-  attempt(() => Object.assign(kept.now, JSON.parse(sessionStorage.getItem(key) || "{}")));
-  kept.keep = (changes) => {
-    Object.assign(kept.now, changes);
-    attempt(() => sessionStorage.setItem(key, JSON.stringify(kept.now)));
-  };
-  return kept;
-}
+/** What a tab keeps of a page: see keptIn(). */
+export const keptInTab = (name, usual) => keptIn("sessionStorage", `${name} ${location.pathname}`, usual);
 
 const SEEN = ["yaw", "pitch", "target", "distance", "radius"]; // of a camera
 

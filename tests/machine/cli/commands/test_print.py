@@ -49,7 +49,7 @@ def test_a_print_is_watched_paused_resumed_and_cancelled_by_keys(hours: str) -> 
         person.press("c")
         person.see(SURE)
         person.press("y")
-        person.see("tiltprint: interrupted after")
+        person.see("tiltprint: the print was cancelled after")
         assert person.end() == 130
     assert "heaters off" in person.seen
     assert not int(str(while_printing[3])) & 2  # ICANON: keys come as they are pressed

@@ -180,7 +180,7 @@ def test_a_print_on_a_server_is_paused_by_a_key_and_cancelled_by_the_second_ctrl
             person.see(LEAVING[:40])
             assert job.state == "printing"
             person.press("\x03")
-            person.see(f"tiltprint: interrupted; the print was cancelled on {address}")
+            person.see(f"tiltprint: the print was cancelled on {address}")
             assert person.settings() == before
             assert person.end() == 130
     assert job.state == "cancelled"

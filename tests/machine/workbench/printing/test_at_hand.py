@@ -64,7 +64,7 @@ def in_hand() -> Iterator[tuple[AtPage, Reporter]]:
 def test_a_printer_is_heated_homed_and_moved_and_its_heaters_go_off_when_it_is_let_go_of() -> None:
     with in_hand() as (person, told):
         person.hear(HandCommand(HandDoes.JOG, "X", 1.0))
-        wait_until(lambda: "once it was homed here" in told.state["status"].message)
+        wait_until(lambda: "only after homing here" in told.state["status"].message)
         person.hear(HandCommand(HandDoes.HEAT))
         wait_until(lambda: told.state["status"].temperature.nozzle_target_c == PROFILE.material.first_layer_nozzle_c)
         assert told.state["status"].temperature.bed_target_c == PROFILE.material.bed_c
@@ -76,7 +76,7 @@ def test_a_printer_is_heated_homed_and_moved_and_its_heaters_go_off_when_it_is_l
         for _ in range(4):  # farther than the axis goes
             person.hear(HandCommand(HandDoes.JOG, "X", 99.0))
         wait_until(lambda: "are allowed" in told.state["status"].message)
-    assert told.state["end"] == End(PrintState.DONE, "let go of; the heaters are off")
+    assert told.state["end"] == End(PrintState.DONE, "disconnected; the heaters are off")
 
 
 def test_the_emergency_stop_halts_a_printer_in_hand() -> None:

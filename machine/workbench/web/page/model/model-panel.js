@@ -105,10 +105,7 @@ function put(place) {
 /** Where on the plate the model and its copies stand: dragged there in the picture, by arrow keys, or typed. */
 export function placePanel(picture) {
   const fields = [$("place-x"), $("place-y")];
-  const putFar = (place) => {
-    put(place);
-    picture?.fit(); // it may be out of sight there
-  };
+  const putFar = (place) => { put(place); picture?.fit(); }; // it may be out of sight there
   fields.forEach((field) => field.addEventListener("change", () => putFar(fields.map(({ value }) => Number(value)))));
   $("place-middle").addEventListener("click", () => putFar(MIDDLE));
   onState(({ plate_told: extent }) => tell({ "place-told": extent }));

@@ -108,10 +108,7 @@ export function marksPanel(picture) {
       knob.style.backgroundColor = `rgb(${MARK_KINDS[zone.kind].colour})`;
     });
   });
-  const take = (faceMarks, key) => {
-    update({ faceMarks });
-    document.documentElement.dataset.marks = key;
-  };
+  const take = (faceMarks, key) => { update({ faceMarks }); document.documentElement.dataset.marks = key; };
   const fetchMarks = newest({ read: async (answer) => new Uint8Array(await answer.arrayBuffer()), take });
   onState((state, before) => {
     const changed = !alike(state.zones, before?.zones), gone = before && !state.busy && changed && store.zone && !state.zones.some((zone) => sameMark(zone, store.zone));

@@ -3,7 +3,7 @@
 import { $, alike, button, disable, hide, listen, made, moveFocus, needsKey, partsInWords, putNew, swatch, tell, tellIn, termsOf, toggle } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
-import { anglesOf, choosePart, figuresNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
+import { anglesOf, choosePart, figuresNow, invalidNow, isLocked, lockPart, planesNow, removePart, reorderPart } from "./planes.js";
 
 export function partsPanel() {
   listen("click", {
@@ -27,11 +27,7 @@ export function partsPanel() {
     update({ row: newest });
     tellRow(newest);
   };
-  const letGo = () => {
-    if (!held) return;
-    held = null;
-    show();
-  };
+  const letGo = () => { if (held) { held = null; show(); } };
   listen("pointerdown", { front: hold });
   for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first
   listen("blur", { front: letGo });
@@ -55,8 +51,19 @@ export function partsPanel() {
   });
 }
 
-const marksUnder = (front, best) => $("front-marks").replaceChildren(...front.map(({ parts }) => (
-  made("span", parts === best ? { text: `${parts} ✓`, className: "recommended", title: "recommended" } : { text: parts }))));
+const marksUnder = (front, best) => $("front-marks").replaceChildren(...front.map((row) => made("span", {}, button(row.parts === best ? `${row.parts} ✓` : row.parts, () => send({ do: "take", parts: row.parts }), {
+  className: row.parts === best ? "recommended" : "", title: [partsInWords(row.parts), row.parts === best && "recommended", besideOne(row)].filter(Boolean).join(", "),
+}))));
+
+const RELATIVE = { support: "support_area_mm2", time: "time_s", plastic: "filament_mm" }; // what is told beside one piece, by the names of a row's values
+
+/** What a row of the front costs more or less than the model in one piece, in words; "": that is the row, or it is not known. */
+function besideOne(row) {
+  const [one] = store.state.front, change = (name) => Math.round(100 * (row[name] / one[name] - 1));
+  if (one?.parts !== 1 || !row || row.parts === 1) return "";
+  const known = Object.entries(RELATIVE).filter(([, name]) => one[name] > 0 && row[name] !== null);
+  return known.map(([word, name]) => `${change(name) > 0 ? "+" : change(name) < 0 ? "−" : "±"}${Math.abs(change(name))} % ${word}`).join(", ");
+}
 
 /** A note of the search, with a button for what it proposes. */
 const noteOf = ({ text, parts }) => made("li", {}, text, ...(parts ? [button(`Choose ${partsInWords(parts)}`, () => send({ do: "take", parts }))] : []));
@@ -69,6 +76,7 @@ function tellRow(row) {
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [
     ["parts", `${row.parts}${byHand ? ", changed by hand since" : row.why && (best || !row.chosen) ? ` (${best ? "recommended" : "only on request"}: ${row.why})` : ""}`],
+    ...[besideOne(byHand ? own : row)].filter(Boolean).map((text) => ["against 1 part", text]),
     ...figures.map(([name, value, unit]) => [name, value ? `${value} ${unit}`.trimEnd() : unknown]),
   ]);
 }
@@ -98,7 +106,8 @@ function partCard(number, figures) {
   const more = { ariaLabel: `lock the plane of part ${number}`, title: "Locked, a search leaves its plane as it is", onchange: ({ target }) => lockPart(number, target.checked) };
   const rows = figures.map(([className, name, text]) => made("div", { className }, ...termsOf([[name, text]])));
   const name = made("label", {}, choose, swatch(store.state.colours[number - 1]), made("span", {}, made("b", { text: `Part ${number}` }), words));
-  const card = made("div", { className: "card" }, name, ...(number > 1 ? [made("input", { ...lock, ...more })] : []), made("dl", {}, ...rows));
+  const invalid = invalidNow(number) && made("p", { className: "invalid", text: `Cannot be cut off here: ${invalidNow(number)}.` });
+  const card = made("div", { className: "card" }, name, ...(number > 1 ? [made("input", { ...lock, ...more })] : []), invalid || made("dl", {}, ...rows));
   card.oncontextmenu = (event) => { event.preventDefault(); openMenu(number, event.clientX, event.clientY); };
   return card;
 }
@@ -112,9 +121,9 @@ export function partsList() {
     removePart(store.part);
   });
   moveFocus($("part-menu"), "button:enabled", { ArrowDown: 1, ArrowUp: -1 });
-  subscribe(({ state: { locked, parts, colours }, part }) => {
+  subscribe(({ state: { locked, parts, colours, invalid }, part }) => {
     const figures = Array.from({ length: parts }, (_, k) => cardRows(k + 1));
-    putNew($("parts-list"), [figures, locked, colours, planesNow(), part], () => figures.map((rows, k) => partCard(k + 1, rows)));
+    putNew($("parts-list"), [figures, locked, colours, invalid, planesNow(), part], () => figures.map((rows, k) => partCard(k + 1, rows)));
   });
 }
 
@@ -128,8 +137,7 @@ const entriesOf = (part) => [
 ];
 
 function showSettings(part) {
-  $("settings-part").value = part;
-  $("settings-part").dispatchEvent(new Event("change"));
+  Object.assign($("settings-part"), { value: part }).dispatchEvent(new Event("change"));
   $("tab-settings").click();
 }
 

@@ -83,7 +83,7 @@ const piecesSeen = () => store.pieces && store.tab === "parts" && !store.hand &&
 export const apartNow = () => (piecesSeen() ? store.apart : 0);
 
 export function apartPanel(picture) {
-  const keyOf = ({ model, rotation, cuts, given, parts }) => (parts && model.drawn ? JSON.stringify([model.key, rotation, cuts, given]) : "");
+  const keyOf = ({ model, rotation, cuts, given, parts, invalid }) => (parts && model.drawn && !invalid.some(Boolean) ? JSON.stringify([model.key, rotation, cuts, given]) : "");
   const take = (pieces) => {
     $("parts-fit").textContent = pieces ? pieces.header.fit : "";
     update({ pieces });

@@ -94,10 +94,7 @@ export const removePart = (part) => send({ do: "remove", part });
 export const lockPart = (part, locked) => send({ do: "lock", part, locked });
 
 /** The part printed as another number, if there is one. */
-export function reorderPart(part, to) {
-  if (Math.min(part, to) < 2 || to > store.state.parts) return;
-  ask({ do: "reorder", part, to }, (refusal) => { if (!refusal) choosePart(to); });
-}
+export const reorderPart = (part, to) => Math.min(part, to) > 1 && to <= store.state.parts && ask({ do: "reorder", part, to }, (refusal) => { if (!refusal) choosePart(to); });
 
 /** The chosen part is the piece above its plane at a place of the platform's frame alone; null: all that lies above. */
 export function cutLimb(place) {
@@ -114,7 +111,8 @@ export function snapTo(face, picture) {
   putPlane({ normal: way, offset_mm: dot(way, seen) });
 }
 
-const REACH = 1.12; // of a section's radius at which the knobs of the tilt stand, as wide as its disc
+const WIDER = 1.25, LEAST_SHARE = 0.1; // of a section's radius and of the model's diagonal: a plane's disc is seen about a thick trunk, too
+const REACH = 1.12; // of that radius at which the knobs of the tilt stand, as wide as its disc
 const ALONG = 0.7, KNOBS_PX = 44; // the knob along the normal, of that; the least radius, so that no knob hides another
 const STEP_MM = 0.5, STEP_DEG = 1;
 const KNOBS = [{ id: "hand-along", tilts: null }, { id: "hand-tilt-a", tilts: 0 }, { id: "hand-tilt-b", tilts: 1 }];
@@ -126,7 +124,8 @@ function sectionNow(picture) {
   const plane = store.tab === "parts" && !apartNow() && store.triangles && store.state.model && picture ? planeNow() : null;
   if (!plane) return null;
   const later = planesNow().slice(store.part - 1), of = JSON.stringify([plane, later, picture.matrix(), document.documentElement.dataset.shown]);
-  if (of !== last.of) last = { of, section: sectionOf(store.triangles, plane, later, picture.matrix()) };
+  const found = of !== last.of && sectionOf(store.triangles, plane, later, picture.matrix()), least = LEAST_SHARE * length(sub(...picture.box()));
+  if (of !== last.of) last = { of, section: found && { ...found, radius_mm: Math.max(WIDER * found.radius_mm, least) } };
   return last.section;
 }
 
@@ -180,15 +179,20 @@ export function handlesOf(picture) {
   };
   picture.drawn.push(place);
   subscribe(() => {
-    const before = section;
     section = sectionNow(picture);
-    if (section !== before) picture.plane(section && { ...planeNow(), ...section });
+    picture.plane(section && { ...planeNow(), ...section, invalid: Boolean(invalidNow() && !store.hand) });
     place();
   });
 }
 
 const REFUSAL_MS = 6000; // for which it is told after the plane is let go
 let refusal = { part: 0, text: "", until: 0 }; // why a plane could not be moved, the last one
+
+/** Why a part's plane cannot be cut where it lies on the bench; "": it can. */
+export const invalidNow = (part = store.part) => store.state.invalid[part - 2] || "";
+
+/** The command that puts a refused plane, or the chosen one where it is invalid, at the nearest place where it can be cut; false: there is none. */
+const nearest = ({ part, state } = store, { normal, offset_mm } = planeNow() || {}) => state.refused?.near || (invalidNow() !== "" && !isLocked() && { do: "move", part, normal, offset_mm });
 
 /** Why the chosen plane cannot be where it is wanted, or could not a moment ago; "": it can. */
 function refusalNow({ hand, part, state: { refused, problem } }) {
@@ -218,14 +222,10 @@ export function planesPanel(picture) {
     });
   };
   const leanAsTyped = () => lean(numberIn("plane-tilt"), numberIn("plane-towards"));
-  byPlane("click", {
-    remove: removePart, lock: (part) => lockPart(part, !isLocked()), neck: (part) => send({ do: "neck", part }), "all-above": () => cutLimb(null), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1),
-  });
+  byPlane("click", { remove: removePart, lock: (part) => lockPart(part, !isLocked()), neck: (part) => send({ do: "neck", part }), "all-above": () => cutLimb(null), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1) });
   byPlane("change", { "plane-offset": () => putPlane({ ...planeNow(), offset_mm: numberIn("plane-offset") }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped });
   onData("tilt", ({ tilt }) => { if (planeNow()) lean(Number(tilt), numberIn("plane-towards")); });
-  listen("click", {
-    "find-others": () => send({ do: "search", ranker: $("ranker").value }), add: () => near(newPlane(picture)), "put-near": () => near(store.state.refused.near),
-  });
+  listen("click", { "find-others": () => send({ do: "search", ranker: $("ranker").value }), add: () => near(newPlane(picture)), "put-near": () => near(nearest()) });
   onState((state, before) => {
     const { hand, part } = store, { trial, cuts, model } = state;
     if (part > Math.max(state.parts, 1) || !model) update({ part: 0 });
@@ -242,9 +242,9 @@ function newPlane(picture) {
 }
 
 function tellAll() {
-  const { state: { locked, search, cuts }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store);
+  const { state: { locked, search, cuts, unsliceable }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store), invalid = invalidNow();
   disable({ "find-others": Boolean(search) || !locked.some(Boolean) });
-  hide({ plane: !plane, "plane-tools": !plane || tab !== "parts" || Boolean(search) });
+  hide({ plane: !plane, "put-near": !nearest(), "plane-tools": !plane || tab !== "parts" || Boolean(search) });
   if (plane) {
     const [tilt, towards] = anglesOf(plane.normal);
     Object.entries({ offset: plane.offset_mm.toFixed(2), tilt: tilt.toFixed(1), towards: towards.toFixed(1) }).forEach(([name, value]) => fill($(`plane-${name}`), value));
@@ -255,10 +255,10 @@ function tellAll() {
     $("earlier").disabled ||= part === 2;
     $("later").disabled ||= part === cuts.length + 1;
   }
-  $("plane-told").classList.toggle("refused", Boolean(why));
-  const told = why ? why : !figures || !cuts.length ? ""
+  $("plane-told").className = why ? "refused" : invalid && "invalid";
+  const told = why ? why : invalid && !store.hand ? `Cannot be cut off here: ${invalid}.` : !figures || !cuts.length ? ""
     : `${mm2(figures.support_area_mm2)} to support, ${figures.seam_mm.toFixed(0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
-  tell({ "plane-told": told, "plane-name": `Part ${part}` });
+  tell({ "plane-told": told, "plane-name": `Part ${part}`, unsliceable: unsliceable && `Cannot be sliced: ${unsliceable}.` });
 }
 
 const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marked

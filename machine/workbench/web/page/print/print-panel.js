@@ -66,10 +66,7 @@ function followIn(print) {
     shown = line;
     post("line", { line });
   };
-  const set = (whether) => {
-    [follows, shown] = [whether, 0];
-    pressed("follow", whether);
-  };
+  const set = (whether) => { [follows, shown] = [whether, 0]; pressed("follow", whether); };
   listen("click", { follow: () => {
     set(!follows);
     update({ looking: follows && (isOf("gcode") ? "gcode" : true) });
@@ -124,7 +121,7 @@ function unforce() {
 function showPorts({ ports, asking, last_printer: last }, before) {
   if (last && !known) choosePort(last);
   disable({ "ask-ports": asking });
-  tell({ "ports-told": asking ? "asking every port who answers: this takes some seconds …" : ports && !ports.length ? "No serial port was found: plug the printer in and switch it on." : "" });
+  tell({ "ports-told": asking ? "asking every port for a printer; this takes a few seconds …" : ports && !ports.length ? "No serial port was found: plug the printer in and switch it on." : "" });
   if (alike(ports, before.ports) && $("ports-found").children.length) return;
   offer("port", port(), (ports || []).map((device) => [device.port, device.port, [device.description, device.words].filter(Boolean).join(": ")]));
   if (ports?.length === 1 && !known) choosePort({ port: ports[0].port });
@@ -133,7 +130,7 @@ function showPorts({ ports, asking, last_printer: last }, before) {
 /** Prints that were cut off, those of the last run of the program among them. */
 function showJournals(journals, before) {
   if (alike(journals, before)) return;
-  tell({ "journals-told": journals && !journals.length ? "No print of this computer was cut off or cancelled." : "" });
+  tell({ "journals-told": journals && !journals.length ? "There is no interrupted or cancelled print on this computer." : "" });
   offer("journal", chosenOr("journal", "journal-typed"), (journals || []).map(({ path, name, machine, line, written_s }) => (
     [path, name, `on ${machine}, up to line ${line}, ${new Date(1000 * written_s).toLocaleString()}`])));
 }
@@ -151,10 +148,7 @@ function stopKey(stop) {
     clearTimeout(timer);
     delete $("emergency").dataset.held;
   };
-  const finish = () => {
-    release();
-    stop();
-  };
+  const finish = () => { release(); stop(); };
   const press = (event) => {
     if (event.key?.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || needsKey(event) || $("emergency").hidden) return;
     event.preventDefault();
@@ -189,7 +183,7 @@ export function printPanel() {
     if (fresh && chosen && (fresh.holder === OWN_PAGE || !running().includes(print()))) chosen = fresh.number; // the stop beside a hand stays its print's
     else if (!print()) chosen = (running().at(-1) || state.prints.at(-1) || { number: 0 }).number;
     const lost = state.prints.find((job) => mine.has(job.number) && job.holder !== OWN_PAGE);
-    if (lost) notice(`Another page has taken over the command of the print of ${lost.name}.`, "taken");
+    if (lost) notice(`Another page has taken control of the print of ${lost.name}.`, "taken");
     taken = (lost || running().find((job) => job.number === taken && job.holder !== OWN_PAGE))?.number || 0;
     if (!taken) notice("", "taken");
     mine = new Set(state.prints.filter((job) => job.holder === OWN_PAGE).map((job) => job.number));
@@ -262,12 +256,12 @@ export function printPanel() {
     hide({ "gcode-line": !gcode });
     if (gcode) $("tab-printing").click();
     if (gcode || store.looking === "gcode") update({ looking: gcode ? "gcode" : false });
-    tell({ "gcode-told": gcode ? `${gcode.name} is open, and printed in place of the bench. ${gcode.told}.` : "" });
+    tell({ "gcode-told": gcode ? `${gcode.name} is printed instead of the model. ${gcode.told}.` : "" });
   });
   onState(({ gcode, lacking: { slices } }) => {
     const why = gcode ? "" : slices;
     disable({ check: Boolean(why) });
-    sayIn("unsliced", why && `Nothing to print: ${why}.`);
+    sayIn("unsliced", why && `${why[0].toUpperCase()}${why.slice(1)}.`);
     follow();
   });
 }

@@ -8,7 +8,7 @@ const FEW = 8;
 const HEARD = new Map(); // by the number of a print: what was heard of it last, and when
 let shownState = "";
 
-const IN_HAND = "in hand";
+const IN_HAND = "manual control";
 
 export function hear(prints) {
   for (const { number, state, told_s: told } of prints) {
@@ -25,7 +25,7 @@ export function silence({ number, is_over: over, live }) {
 
 export function showWhich(prints, chosen) {
   hide({ "which-line": prints.length < 2 });
-  const entries = prints.map((job) => [job.number, `${job.name} at ${job.port}: ${job.state}`]);
+  const entries = prints.map((job) => [job.number, `${job.name} on ${job.port}: ${job.state}`]);
   putNew($("which"), entries, () => optionsOf(entries));
   $("which").value = chosen;
 }
@@ -38,7 +38,7 @@ export function showPrint(print, commands) {
   const { state, is_over: over, is_away: paused, live, figures, server } = print, uploads = state === "uploading";
   const runs = print.is_printing || state === IN_HAND, asking = !runs && !uploads && (!over || state === "refused");
   const commanded = print.is_printing && state !== "cancelling" && commands;
-  const held = print.held ? "Another page commands this print; this one watches." : "No page commands this print: it goes on by itself.";
+  const held = print.held ? "Another page controls this print; this one only watches." : "No page controls this print; it goes on by itself.";
   tell({ ...print.texts, "run-state": howTold(print), "held-told": held });
   hide({
     "run-ask": state !== "ready" || !commands, "run-live": !live && !uploads, "run-upload": !uploads || !commands, "leave-printing": !server,
@@ -51,7 +51,7 @@ export function showPrint(print, commands) {
   listIn("run-checks", asking ? [...print.checks.map(({ text, forced }) => (forced ? `${text}; going on anyway` : text)), ...(figures && !over ? [figures.text] : [])] : []);
   listIn("run-findings", asking && figures ? figures.findings : []);
   listIn("run-words", print.words.slice(-FEW));
-  listIn("run-said", runs || uploads || over ? print.said.filter((line) => line && (!print.log || !line.includes(print.log))).slice(-FEW) : []);
+  listIn("run-said", runs || uploads || over ? print.said.filter((line) => line && ![print.log, over && print.sentence].some((told) => told && line.includes(told))).slice(-FEW) : []);
   tellIn("run-files", [["journal", print.journal], ["log", print.log]].filter(([, path]) => path));
   if (live || uploads) showProgress(print);
   const kind = `${print.number} ${over ? "over" : runs ? "runs" : state}`;
@@ -69,7 +69,8 @@ function ago(moment_s) {
 export function showProgress(print) {
   const { is_over: over, state } = print, old = print.heat_is_old || silence(print);
   const of = (value, most) => `${value}${most ? ` of ${most}` : ""}`;
-  const heat = (name, now, target) => now != null && [name, `${now.toFixed(1)}${target ? ` of ${target.toFixed(0)}` : ""} °C${old ? `, as last known ${ago(print.heat_s)}` : ""}`, old ? "old" : ""];
+  const heat = (name, now, target, off = over && target === 0) => now != null
+    && [name, `${off ? "off, " : ""}${now.toFixed(1)}${target ? ` of ${target.toFixed(0)}` : ""} °C${old ? off ? ` (${ago(print.heat_s)})` : `, as last known ${ago(print.heat_s)}` : ""}`, old && !off ? "old" : ""];
   $("run-progress").value = print.share || 0;
   if (state === "uploading") return tellIn("run-told", []);
   hide({ "run-progress": state === IN_HAND });
@@ -80,7 +81,7 @@ export function showProgress(print) {
     heat("bed", print.bed_c, print.bed_target_c),
     Object.keys(print.at).length && ["position", Object.entries(print.at).map(([letter, value]) => `${letter} ${value.toFixed(1)}`).join("  ")],
     (print.total != null || print.acknowledged) && ["line", of(print.acknowledged, print.total)],
-    [over ? "took" : "so far", duration(print.elapsed_s)],
+    [over ? "took" : "elapsed", duration(print.elapsed_s)],
     !over && print.left_s != null && ["done at", clock(Date.now() / 1000 + print.left_s)],
   ].filter(Boolean));
   tell({ "offset-told": `${print.z_offset_mm > 0 ? "+" : ""}${print.z_offset_mm} mm`.replace("-", "−") });
@@ -101,17 +102,18 @@ export function showBar(running, looked) {
   const shown = running.includes(looked) ? looked : running.at(-1);
   hide({ "bar-told": !shown, "emergency": !shown, "print-bar": !shown && $("stop-told").hidden });
   if (!shown) return;
-  tell({ "bar-told": `${shown.name} at ${shown.port}: ${howTold(shown)}` });
+  tell({ "bar-told": `${shown.name} on ${shown.port}: ${howTold(shown)}` });
   $("emergency").dataset.print = shown.number;
 }
 
-const titled = { model: "", share: null };
+const titled = { name: "", share: null };
 const heard = new Map(); // whether it runs, by the number of a print that this page commands
 
-/** The tab's title has the model's name, and the share that is done of the newest print that runs; null: none runs. */
+/** The page's title is the name of the model, or of the G-code file that is shown; the tab's has it, too, and the share that is done of the newest print that runs; null: none runs. */
 export function tellTitle(news) {
-  const { model, share } = Object.assign(titled, news);
-  document.title = [share == null ? "" : `${Math.floor(100 * share)} %`, model, "tiltprint"].filter(Boolean).join(" – ");
+  const { name, share } = Object.assign(titled, news);
+  tell({ title: name || "tiltprint" });
+  document.title = [share == null ? "" : `${Math.floor(100 * share)} %`, name, "tiltprint"].filter(Boolean).join(" – ");
 }
 
 /** Asked as a print begins, for a hand has just pressed a button: may the browser say when it is over? */

@@ -4,7 +4,7 @@ import { alike, nextFrame } from "../../../../view/template/elements.js";
 import { cameraOf, HALF_HEIGHT, placeOn } from "../../../../view/template/picture/camera.js";
 import { cardOf, frameOf, outgrown, outlive, sizeOf } from "../../../../view/template/picture/gl.js";
 import { add, bounds, carried, cornersOf, dot, IDENTITY, length, moved, multiply, projected, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
-import { bodiesOf, bodyOf, boxEdges, clipOf, cutsOf, FROM_BELOW, MOST_CUTS, ON_PLATE, planesOf, solidOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
+import { bodiesOf, bodyOf, boxEdges, clipOf, cutsOf, FROM_BELOW, MOST_CUTS, ON_PLATE, planesOf, RED, solidOf, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { markedOver } from "../parts/marks-panel.js";
 import { piecesOn } from "../parts/pieces.js";
 import { paintedRed, planeBefore, standingBy } from "./triangles.js";
@@ -168,10 +168,10 @@ export function pictureOf(canvas, camera) {
     },
     /** The walls of what is sliced, triangles of each part, with the model and its copies as ghosts about them; null: none. */
     walls: take("walls"),
-    /** The plane in hand {normal, centre_mm, radius_mm} in the platform's frame, or none. */
+    /** The plane in hand {normal, centre_mm, radius_mm, invalid} in the platform's frame, or none. */
     plane: (plane) => extra("plane", plane ? JSON.stringify(plane) : "", () => {
-      const { discs, rims } = planesOf(plane ? [{ base: plane, direction: plane.normal }] : [], () => PLANE_COLOUR);
-      return [{ solid: discs, lines: rims, strength: 0.3 }];
+      const { discs, rims } = planesOf(plane ? [{ base: plane, direction: plane.normal }] : [], () => (plane.invalid ? RED : PLANE_COLOUR));
+      return [{ solid: discs, strength: 0.3 }, { solid: discs, lines: rims, strength: 0.2, over: true }]; // its outline and a veil are seen through the model
     }),
     /** The triangles of what the model stands on, in the platform's frame, and of the other models, from the middle of all, or none. */
     pedestal: take("pedestal"), others: take("others"),

@@ -52,15 +52,8 @@ export function settingsPanel() {
     }), $("settings-list"));
   };
   const fold = (group, folded) => keep({ folded: [...kept.now.folded.filter((name) => name !== group), ...(folded ? [group] : [])] });
-  const keep = (shown) => {
-    kept.keep(shown);
-    list();
-  };
-  const showChanged = (only) => {
-    changedOnly = only;
-    pressed("only-changed", only);
-    list();
-  };
+  const keep = (shown) => { kept.keep(shown); list(); };
+  const showChanged = (only) => { changedOnly = only; pressed("only-changed", only); list(); };
   const take = (told) => {
     if (!told) return;
     settings = told.settings;

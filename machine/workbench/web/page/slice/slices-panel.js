@@ -21,12 +21,13 @@ export function slicesPanel(showFinding) {
     showShares(slicing, colours);
     toggle("no-slices", !sliced);
     toggle("stale", sliced?.stale);
+    toggle("slicing", slicing);
+    tellIn("sliced-told", (sliced?.told || []).map(([name, text]) => [name, slicing ? "…" : text]));
   });
   onNew(({ sliced }) => sliced, (sliced) => {
-    const { told = [], joints = [], verdict } = sliced || {};
+    const { joints = [], verdict } = sliced || {};
     if (sliced) showVerdict(verdict, showFinding);
     else if (store.looking === true) update({ looking: false });
-    tellIn("sliced-told", told);
     putTable($("joints"), joints, JOINT_HEAD, () => joints.map(figuresRow));
     showFindings(sliced, showFinding);
   });
@@ -64,7 +65,7 @@ function showFindings(sliced, showFinding) {
   const { findings = [], more_findings: more = 0 } = sliced || {};
   hide({ "no-findings": !sliced || findings.length > 0 });
   const rows = findings.map((finding, k) => findingButton(finding, () => showFinding(k), { whole: "the whole print", ending: ": show it" }));
-  $("sliced-findings").replaceChildren(...[...rows, ...(more ? [`and ${more} more, in the page of the print`] : [])].map((row) => made("li", {}, row)));
+  $("sliced-findings").replaceChildren(...[...rows, ...(more ? [`and ${more} more, in the preview`] : [])].map((row) => made("li", {}, row)));
 }
 
 export function stopsPanel() {
