@@ -82,7 +82,9 @@ class FrontRow:
     """A decomposition on the Pareto front: its planes in the order of the cuts, and its cost.
 
     seam_mm: length of the rims of all cuts; stairs_mm2: cost of the stair-stepping of all parts; time_s, filament_mm: estimates,
-    None if not estimated; reason: why it was chosen; flaw: why it is chosen only on request, empty if nothing speaks against it.
+    None if not estimated; total_mm2: cost with time, filament and the charge for further parts, None if these do not count;
+    reason: why it was chosen, as it follows that word; flaw: why it is chosen only on request, empty if nothing speaks against
+    it.
     """
 
     planes: tuple[Plane, ...]
@@ -95,6 +97,7 @@ class FrontRow:
     reason: str = ""
     stairs_mm2: float = 0.0
     flaw: str = ""
+    total_mm2: float | None = None
 
     @property
     def parts(self) -> int:

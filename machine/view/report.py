@@ -157,19 +157,20 @@ def _front(decomposition: Decomposition) -> list[Table]:
     front = decomposition.front
     if len(front) < 2:
         return []
-    rows = []
+    rows, summed = [], any(row.total_mm2 is not None for row in front)
     for row in front:
         time = "–" if row.time_s is None else duration(row.time_s)
         filament = "–" if row.filament_mm is None else f"{row.filament_mm / 1000:.1f}"
         areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", f"{row.cost_mm2:.1f}"]
-        rows.append([f"{row.parts}{' (chosen)' * row.chosen}", *areas, time, filament])
-    notes = [f"chosen: {row.reason}" for row in front if row.chosen]
+        total = ["–" if row.total_mm2 is None else f"{row.total_mm2:.1f}"] if summed else []
+        rows.append([f"{row.parts}{' (chosen)' * row.chosen}", *areas, time, filament, *total])
+    notes = [f"chosen {row.reason}" for row in front if row.chosen]
     notes += [f"{counted(row.parts, 'part')} only on request: {row.flaw}" for row in front if row.flaw and not row.chosen]
     notes.append("--parts selects another row; time and filament are estimates")
     return [
         _table(
             "Number of parts",
-            ["parts", "needs support mm²", "seams mm", "stair-stepping mm²", "cost mm²", "time", "m"],
+            ["parts", "needs support mm²", "seams mm", "stair-stepping mm²", "cost mm²", "time", "m", *["total mm²"] * summed],
             rows,
             notes,
         )

@@ -1,7 +1,7 @@
 """Pareto front: the best decomposition of a search for every number of parts, and the choice among them."""
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,9 +18,9 @@ from profiles.profile import Profile
 # seams.
 EQUAL = 0.01
 
-ASKED, BY_PLAN = "chosen by you", "cut by the plan"
-LEAST_PARTS = "the fewest parts at about the lowest cost"
-PRINTABLE = "the lowest cost that prints well"
+ASKED, BY_PLAN = "by you", "by the plan"  # what follows "chosen"
+LEAST_PARTS = "for the fewest parts at about the lowest cost"
+PRINTABLE = "for the lowest cost that prints well"
 Price = tuple[float, float]  # printing time of the parts, s, and filament, mm
 Pricing = Callable[[Sequence[Part]], Price | None]  # None: the parts cannot be printed
 
@@ -134,13 +134,25 @@ class Weights:
 
 @dataclass(frozen=True)
 class Choice:
-    """The position of the chosen row in a front and the reason; note: the saving and the price of the row with the fewest
-    blemishes.
+    """The position of the chosen row in a front, and the reason as it follows the word "chosen".
+
+    note: the saving and the price of the row with the fewest blemishes; totals_mm2: the totals that were compared, by position,
+    empty if only the costs were.
     """
 
     place: int
     reason: str
     note: tuple[str, ...] = ()
+    totals_mm2: Mapping[int, float] = field(default_factory=dict)
+
+    def marked(self, rows: Iterable[FrontRow]) -> list[FrontRow]:
+        """The rows with their totals, and the chosen one marked."""
+        return [
+            replace(
+                row, chosen=place == self.place, reason=self.reason * (place == self.place), total_mm2=self.totals_mm2.get(place)
+            )
+            for place, row in enumerate(rows)
+        ]
 
 
 def charge_mm2(rows: Sequence[FrontRow], weights: Weights, least_saving: float) -> float:
@@ -163,24 +175,26 @@ def choose(rows: Sequence[FrontRow], weights: Weights, least_saving: float = 0.0
     pareto_optimal_rows = [place for place, good in enumerate(pareto_optimal(rows)) if good and unflawed[place]]
     timed = [place for place in pareto_optimal_rows if rows[place].time_s is not None]
     places, first = timed or pareto_optimal_rows, (timed or pareto_optimal_rows)[0]
-    totals = {place: rows[place].cost_mm2 + (weights.of_row(rows[place]) or 0.0) for place in places}
-    charge = charge_mm2([rows[place] for place in places], weights, least_saving)
+    charge, totals = charge_mm2([rows[place] for place in places], weights, least_saving), dict[int, float]()
+    if weights and timed:
+        further = {place: rows[place].parts - rows[first].parts for place in places}
+        totals = {
+            place: rows[place].cost_mm2 + (weights.of_row(rows[place]) or 0.0) + charge * further[place] for place in places
+        }
     limit_mm2 = min(rows[place].cost_mm2 for place in places) + EQUAL * rows[first].cost_mm2
     scars = taken = next(place for place in places if rows[place].cost_mm2 <= limit_mm2)
-    if weights and timed:
-        taken = min(places, key=lambda place: totals[place] + charge * (rows[place].parts - rows[first].parts))
+    if totals:
+        taken = min(places, key=lambda place: totals[place])
     least_mm2 = min(row.cost_mm2 for row in rows)
     if rows[taken].cost_mm2 <= least_mm2:
-        reason = "the lowest cost"
+        reason = "for the lowest cost"
     elif taken == scars:
         reason = LEAST_PARTS if min(rows[place].cost_mm2 for place in places) <= least_mm2 else PRINTABLE
-    elif totals[taken] <= min(totals.values()):
-        reason = "the lowest cost, time included"
     else:
-        reason = f"each further part would save less than {100.0 * least_saving:g} %"
+        reason = "for the lowest total"
     cheapest = min(rows, key=lambda row: row.cost_mm2)
     worth = cheapest.flaw and cheapest.cost_mm2 < (1.0 - EQUAL) * rows[taken].cost_mm2
-    return Choice(taken, reason, _savings_notes(cheapest if worth else rows[scars], rows[taken]))
+    return Choice(taken, reason, _savings_notes(cheapest if worth else rows[scars], rows[taken]), totals)
 
 
 def _savings_notes(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:

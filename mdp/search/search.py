@@ -28,7 +28,6 @@ from mdp.search.coarse import coarse_copy, cut_as_copy
 from mdp.search.front import (
     ASKED,
     BY_PLAN,
-    Choice,
     ParetoFront,
     Pricing,
     Weights,
@@ -162,17 +161,16 @@ def _take(
         rows = price_rows(rows, {place: parts for place, parts in paying.items() if not flaws[place]}, price)
     choice = choose(rows, Weights.of(problem.profile), problem.settings.least_saving)
     if request.parts is not None:
-        choice = Choice(nodes.index(front.up_to(request.parts)), ASKED)
+        choice = replace(choice, place=nodes.index(front.up_to(request.parts)), reason=ASKED, note=())
     elif problem.terms.seam_mm <= 0.0:
         # this node, or its equal in cost
         place = next(place for place, node in enumerate(nodes) if len(node.cuts) == len(best.cuts))
-        choice = Choice(place, "the least area that needs support")
+        choice = replace(choice, place=place, reason="for the least area that needs support", note=())
     node, row = nodes[choice.place], rows[choice.place]
     parts = paying.get(choice.place) or make_parts(problem, node)
     if price is not None and row.time_s is None:
-        row = with_price(row, price(parts))
-    rows[choice.place] = replace(row, chosen=True, reason=choice.reason)
-    return parts, rows, (*_feature_notes(node), *choice.note)
+        rows[choice.place] = with_price(row, price(parts))
+    return parts, choice.marked(rows), (*_feature_notes(node), *choice.note)
 
 
 def _feature_notes(node: Node) -> list[str]:

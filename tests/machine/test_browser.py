@@ -267,7 +267,7 @@ def choices(browser: Browser, tmp_path: Path) -> Browser:
     post = Plane(np.array([0.0, 0.0, 1.0]), 30.0)
     front = (
         FrontRow((), 100.0, 0.0, 130.0, stairs_mm2=30.4),
-        FrontRow((hand.SIDE,), 0.0, 40.0, 24.0, chosen=True, time_s=4000.0, filament_mm=1234.0, reason="the lowest cost"),
+        FrontRow((hand.SIDE,), 0.0, 40.0, 24.0, chosen=True, time_s=4000.0, filament_mm=1234.0, reason="for the lowest cost"),
         FrontRow((hand.SIDE, post), 0.0, 80.0, 48.0),
     )
     return opened(browser, tmp_path, parts_page(replace(decomposition, front=front), profile))
@@ -279,7 +279,7 @@ def test_the_front_is_shown_with_dashes_where_nothing_is_estimated(choices: Brow
     )
     assert lines[0] == ["1", "100.0", "0", "30.4", "–", "–"]
     assert lines[1] == ["2✓", "0.0", "40", "0.0", "1h 7m", "1.2"]
-    assert text(choices, "front-told") == "✓ chosen: the lowest cost."
+    assert text(choices, "front-told") == "✓ chosen for the lowest cost."
 
 
 def test_another_row_of_the_front_shows_its_cuts_and_the_command_by_the_keyboard_alone(choices: Browser) -> None:

@@ -74,8 +74,10 @@ def joints_table(joints: "Sequence[Joint]") -> str:
 
 
 def front_table(front: "Sequence[FrontRow]") -> str:
-    """The best decomposition for every number of parts, the chosen one marked and why."""
-    rows = [["in parts", "needs support mm²", "seams mm", "stair-stepping mm²", "cost mm²", "time", "filament m"]]
+    """The best decomposition for every number of parts, the chosen one marked and why; the totals if they decided."""
+    summed = any(row.total_mm2 is not None for row in front)
+    total = ["total mm²"] if summed else []
+    rows = [["in parts", "needs support mm²", "seams mm", "stair-stepping mm²", "cost mm²", "time", "filament m", *total]]
     rows += [
         [
             str(row.parts),
@@ -84,11 +86,12 @@ def front_table(front: "Sequence[FrontRow]") -> str:
             f"{row.stairs_mm2:.0f}",
             _number(row.cost_mm2),
             *estimates(row),
+            *(["-" if row.total_mm2 is None else _number(row.total_mm2)] if summed else []),
         ]
         for row in front
     ]
     head, *lines = table(rows).splitlines()
-    reasons = [f"  chosen: {row.reason}" if row.chosen else row.flaw and f"  only on request: {row.flaw}" for row in front]
+    reasons = [f"  chosen {row.reason}" if row.chosen else row.flaw and f"  only on request: {row.flaw}" for row in front]
     return "\n".join([head, *(line + reason for line, reason in zip(lines, reasons, strict=True))]) + "\n"
 
 

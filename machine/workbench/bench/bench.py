@@ -312,11 +312,7 @@ def with_prices(bench: Bench, prices: Mapping[int, FrontRow]) -> Bench:
         return replace(bench, rows=tuple(rows), priced=True)
     search = bench.profile.search
     choice = choose(rows, Weights.of(bench.profile), search.least_saving)
-    marked = [
-        replace(row, chosen=number == choice.place, reason=choice.reason if number == choice.place else "")
-        for number, row in enumerate(rows)
-    ]
-    return replace(bench, rows=tuple(marked), recommended=rows[choice.place].parts, priced=True)
+    return replace(bench, rows=tuple(choice.marked(rows)), recommended=rows[choice.place].parts, priced=True)
 
 
 def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: Profile) -> Bench:

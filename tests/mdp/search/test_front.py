@@ -61,8 +61,13 @@ def test_every_further_part_saves_at_least_that_share_of_the_cost_of_one_piece(l
     assert choose(THREE, Weights(0.5), least_saving=least_saving).place + 1 == parts
 
 
-def test_the_reason_names_the_demand_that_more_parts_do_not_meet() -> None:
-    assert choose(THREE, Weights(0.5), least_saving=0.19).reason == "each further part would save less than 19 %"
+def test_the_chosen_row_has_the_lowest_total_of_cost_time_and_the_charge_for_further_parts() -> None:
+    choice = choose(THREE, Weights(0.5), least_saving=0.19)
+    assert (choice.place, choice.reason) == (1, "for the lowest total")
+    marked = choice.marked(THREE)
+    assert [row.total_mm2 for row in marked] == pytest.approx([1100.0, 700.0 + 0.19 * 1100.0, 500.0 + 0.38 * 1100.0])
+    assert [row.chosen for row in marked] == [False, True, False]
+    assert [row.total_mm2 for row in choose(THREE, Weights(0.0)).marked(THREE)] == [None] * 3
 
 
 def test_what_more_cuts_would_save_is_told_with_what_it_takes() -> None:
@@ -92,7 +97,7 @@ def test_a_row_that_cannot_be_printed_is_not_taken_while_another_one_can() -> No
 
 def test_what_is_given_up_for_time_is_told_with_figures() -> None:
     choice = choose(BUNNY, Weights(1.0))
-    assert choice.reason == "the lowest cost, time included"
+    assert choice.reason == "for the lowest total"
     assert choice.note == (
         "4 parts would save 501 mm² of visible marks (support on 1384 instead of 1885 mm²), but take 24 min longer: "
         f"{advice('parts', 4)}",
@@ -124,7 +129,7 @@ def test_of_two_rows_that_take_as_long_the_one_with_less_filament_is_taken_where
 
 
 def test_a_row_without_a_time_is_said_to_be_no_choice() -> None:
-    assert choose(front((200.0, 900.0), (100.0, None)), Weights(1.0)).reason == "the lowest cost that prints well"
+    assert choose(front((200.0, 900.0), (100.0, None)), Weights(1.0)).reason == "for the lowest cost that prints well"
 
 
 def test_where_time_counts_nothing_as_without_support_there_is_no_charge() -> None:

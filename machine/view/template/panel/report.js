@@ -25,7 +25,7 @@ const pays = (row, fewer) => fewer.every(({ cost_mm2: cost }) => row.cost_mm2 < 
 
 function lineOf(row, idle, choose) {
   const mark = made("input", { type: "radio", name: "front", value: row.parts, checked: row.chosen, onchange: () => choose(row) });
-  const label = made("label", {}, mark, `${row.parts}`, ...(row.chosen ? [made("b", { text: "✓", title: `chosen: ${row.why}` })] : []));
+  const label = made("label", {}, mark, `${row.parts}`, ...(row.chosen ? [made("b", { text: "✓", title: `chosen ${row.why}` })] : []));
   const line = rowOf([label, ...row.figures.map(([, value]) => value || "–")]);
   line.className = idle ? "idle" : "";
   line.onclick = ({ target }) => { if (!line.cells[0].contains(target)) label.click(); };
@@ -34,7 +34,7 @@ function lineOf(row, idle, choose) {
 
 /** What to know of the row that is looked at. */
 function showChoice(row, drawn) {
-  const told = !row ? ["Cut by a plan: none of these rows."] : row.chosen ? [`✓ chosen: ${row.why}.`]
+  const told = !row ? ["Cut by a plan: none of these rows."] : row.chosen ? [`✓ chosen ${row.why}.`]
     : [drawn ? "This is how it would be cut; " : "It was not made; ", made("code", { text: row.command }), " takes it, and ", made("code", { text: "--parts", className: "whole" }), " goes with every other command too."];
   $("front-told").replaceChildren(...told);
 }

@@ -18,7 +18,7 @@ CUT = FrontRow(PLANES, 30.0, 80.0, 78.0, stairs_mm2=6.0, time_s=3600.0, filament
 
 
 def test_what_was_chosen_is_advised() -> None:
-    decomposition = replace(tee_in_parts(), front=(WHOLE, replace(CUT, chosen=True, reason="the lowest cost")))
+    decomposition = replace(tee_in_parts(), front=(WHOLE, replace(CUT, chosen=True, reason="for the lowest cost")))
     assert advice(decomposition, PROFILE).splitlines() == [
         "print it      needs support mm²    less  seams mm  stair-stepping mm²  cost mm²   time  filament m",
         "in one piece              300.0                 0                 125     425.4  1h 2m         4.0",
@@ -28,7 +28,7 @@ def test_what_was_chosen_is_advised() -> None:
 
 
 def test_whoever_asked_for_other_parts_is_told_which_cost_less() -> None:
-    decomposition = replace(alone(tee(), 300.0), front=(replace(WHOLE, chosen=True, reason="chosen by you"), CUT))
+    decomposition = replace(alone(tee(), 300.0), front=(replace(WHOLE, chosen=True, reason="by you"), CUT))
     assert advice(decomposition, PROFILE).splitlines()[-1] == "best: print it in 3 parts: --parts 3"
 
 

@@ -51,15 +51,25 @@ def test_the_front_stands_below_the_parts_with_the_row_taken_and_why() -> None:
     rows = (
         FrontRow((), 300.0, 0.0, 312.0, stairs_mm2=12.4, time_s=3723.0, filament_mm=4040.0),
         FrontRow(planes[:1], 150.0, 40.0, 174.0),
-        FrontRow(planes, 30.0, 80.0, 78.0, chosen=True, reason="the lowest cost"),
+        FrontRow(planes, 30.0, 80.0, 78.0, chosen=True, reason="for the lowest cost"),
     )
     assert front_table(rows).splitlines() == [
         "in parts  needs support mm²  seams mm  stair-stepping mm²  cost mm²   time  filament m",
         "1                     300.0         0                  12     312.0  1h 2m         4.0",
         "2                     150.0        40                   0     174.0      -           -",
-        "3                      30.0        80                   0      78.0      -           -  chosen: the lowest cost",
+        "3                      30.0        80                   0      78.0      -           -  chosen for the lowest cost",
     ]
     assert front_table(rows) in parts_table(replace(tee_in_parts(), front=rows))
+
+
+def test_the_front_shows_the_totals_if_they_decided() -> None:
+    whole = FrontRow((), 300.0, 0.0, 312.0, chosen=True, reason="for its total", total_mm2=512.3)
+    rows = (whole, FrontRow((Plane(np.array([1.0, 0.0, 0.0]), 5.0),), 150.0, 40.0, 174.0))
+    assert front_table(rows).splitlines() == [
+        "in parts  needs support mm²  seams mm  stair-stepping mm²  cost mm²  time  filament m  total mm²",
+        "1                     300.0         0                   0     312.0     -           -      512.3  chosen for its total",
+        "2                     150.0        40                   0     174.0     -           -          -",
+    ]
 
 
 def test_the_joints_stand_in_print_order_and_the_weakest_is_named() -> None:
