@@ -45,7 +45,7 @@ PHRASES = {
     "offset": "the offset is {} mm",
     "protected": "protected area {}",
     "page": "{}",
-    "one part": "choose 1 part",
+    "one part": "choose 1 part under Parts",
     "settings": "Settings",
     "": "",
 }

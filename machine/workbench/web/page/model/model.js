@@ -71,6 +71,7 @@ export function bodiesOf(picture) {
     const take = (body, of) => {
       update({ [name]: body && { of, body } });
       document.documentElement.dataset[name] = body ? of : "";
+      if (store.state.misplaced) picture.fit();
     };
     const fetchBody = newest({ read: async (answer) => trianglesFrom(await answer.arrayBuffer()), take, insists: true });
     onState(({ [name]: key }) => { if (key !== null) fetchBody(key, `${name}/${key}`); }); // null: not known yet
