@@ -29,6 +29,7 @@ OPTIONS = {
 }
 PHRASES = {
     "again": "try again",
+    "calibration": "(the command tiltprint calibrate measures them)",
     "another baud rate": "try another baud rate",
     "another plate": "choose another one below",
     "compiling": "getting ready (first run only)",

@@ -449,6 +449,27 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
     ]
 
 
+def test_a_search_that_replaces_planes_made_by_hand_says_so_and_how_to_have_them_back() -> None:
+    found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
+    notes: list[str] = []
+
+    async def work(session: Session) -> None:
+        async def find(task: Any, *given: Any, **more: Any) -> Any:
+            return Found((found,), ())
+
+        session.long.run = find  # type: ignore[method-assign]
+        session.do("add", with_cuts(session.bench, (PlannedPart(UP, 9.0),)))
+        for _ in range(2):
+            obey(session, {"do": "search"})
+            await session.finding.wait()
+            await asyncio.sleep(0)
+            await session.finding.wait()
+            notes.append(session.note)
+
+    when_done(work)
+    assert notes == ["your planes were replaced: Undo brings them back", ""]
+
+
 def test_a_search_that_begins_in_the_instant_in_which_another_is_stopped_goes_on() -> None:
     found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
 

@@ -44,14 +44,8 @@ function upload(file, how, to, sent, answered) {
     Object.assign($("sending-bar"), { value: loaded, max: total });
     tell({ "sending-told": `Sending ${file.name}: ${mb(loaded)} of ${mb(total)} MB` });
   };
-  request.upload.onloadend = () => { // the server reads it now, which its state tells
-    hide({ sending: true });
-    sent();
-  };
-  request.onloadend = () => {
-    sent();
-    answered();
-  };
+  request.upload.onloadend = () => { hide({ sending: true }); sent(); }; // the server reads it now, which its state tells
+  request.onloadend = () => { sent(); answered(); };
   $("sending-cancel").onclick = () => request.abort();
   request.open("POST", `${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE, ...how })}`);
   request.send(file);

@@ -59,9 +59,10 @@ export function modelOf(picture) {
 function look(picture, red) {
   const { state: { search, parts, colours }, tab, row, part } = store;
   const planes = row ? row.planes : search?.planes.length ? search.planes : parts ? planesNow() : null, cut = tab !== "model" && planes;
-  picture.cut(cut && !planes.some((plane) => plane.limbs_mm) ? planes : null, row || search ? colours : fadedColours(colours, part));
+  const limbs = cut && planes.some((plane) => plane.limbs_mm);
+  picture.cut(limbs ? null : cut, row || search ? colours : fadedColours(colours, part));
   picture.red(cut ? null : red);
-  const entries = cut ? swatches(colours.slice(0, planes.length + 1).map((colour, k) => [colour, `${k + 1}`])) : [];
+  const entries = cut && (!limbs || store.pieces) ? swatches(colours.slice(0, planes.length + 1).map((colour, k) => [colour, `${k + 1}`])) : [];
   $("legend").replaceChildren(...(entries.length ? [made("b", { text: "parts, in print order" }), ...entries] : []));
 }
 

@@ -88,7 +88,8 @@ export function pictureOf(canvas, camera) {
     if (outgrown(canvas)) [canvas.width, canvas.height] = size;
     frame.begin(...size);
     if (!below) card.table.draw(ground, { lift: ON_PLATE });
-    if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts, capped);
+    const apart = scene.shifts.some((shift) => shift.some(Boolean)); // the first model alone
+    if (card.pieces && !scene.walls) for (const place of [[0, 0, 0], ...(apart ? [] : scene.copies)]) card.pieces.draw((shift) => seenAs(moved(add(place, shift))), scene.shifts, capped);
     else if (card.model) {
       card.walls.forEach((wall) => wall.draw(ground, open));
       for (const [k, shift] of [[0, 0, 0], ...scene.copies.slice(0, bodies())].entries()) {
