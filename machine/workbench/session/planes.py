@@ -252,6 +252,8 @@ class PlaneTrials:
     def unsliceable(self) -> str:
         """Sentence on why planes on the bench keep it from being sliced; "" if they do not."""
         words, count = invalid_in_words(self._session.bench, self.invalid), len(self.invalid)
+        if words.endswith("cannot cut this model"):  # at no tilt
+            return f"{words}: remove its plane, or choose another machine under Settings"
         return words and f"{words}: move or remove {'its plane' if count == 1 else 'their planes'}, or find parts again"
 
     def _wanted(self, bench: Bench) -> Cuts | None:
