@@ -25,7 +25,7 @@ from profiles.errors import UserError, causes, notes
 
 ASKED_BY_SHELL = "_TILTPRINT_COMPLETE"  # set by the script of --install-completion, which expects completions
 FULL = (errno.ENOSPC, errno.EDQUOT)
-# What other programs call it -> the command that does it here.
+# Name of a command in other programs -> the command that does the same here.
 ELSEWHERE = {"slice": "export", "cut": "decompose", "check": "simulate", "preview": "view", "gui": "edit", "open": "edit"}
 # Type of a pydantic error -> what the value must be.
 EXPECTED = {

@@ -50,7 +50,7 @@ class Tip:
     """Position of the tip (machine X Y Z), pose of the table, hull of the earlier parts, and all moves so far.
 
     trail: (n, 3) path of a wipe over the strokes since the last retraction. run_in_mm: filament that the next inner strokes are
-    to push in addition. beside: the part being printed and what stands beside it, if it is a limb or the plate has clips.
+    to push in addition. beside: the index of a part with obstacles beside it (a limb's other pieces, clips), and these.
     has_limbs: a limb has been printed, so that the print may be higher than the tip.
     """
 
@@ -113,7 +113,7 @@ def height_to(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: 
 
 
 def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, over: float) -> float:
-    """Z at which the head clears what stands beside the part on the way to a path's start. `over` if that suffices, else the
+    """Z at which the head clears the obstacles beside the part on the way to a path's start. `over` if that suffices, else the
     least sufficient height with the clearance of the nozzle."""
     assert tip.beside is not None
     (part, standing), machine = tip.beside, tip.profile.machine
