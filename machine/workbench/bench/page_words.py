@@ -29,7 +29,7 @@ OPTIONS = {
 }
 PHRASES = {
     "again": "try again",
-    "calibration": "(the command tiltprint calibrate measures them)",
+    "calibration": "(measure them; for the axes there is the command tiltprint calibrate)",
     "another baud rate": "try another baud rate",
     "another plate": "choose another one below",
     "compiling": "getting ready (first run only)",

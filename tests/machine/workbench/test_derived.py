@@ -10,8 +10,8 @@ import pytest
 
 from machine.workbench.bench.bench import Bench, Step
 from machine.workbench.session.base import Derived, SessionBase
-from machine.workbench.session.planes import standing_of
-from machine.workbench.work.models import Standing
+from machine.workbench.session.planes import plated_of
+from machine.workbench.work.plate import Plated
 from machine.workbench.work.worker_pool import WorkerPools
 from profiles.errors import PlanError, UserError
 from profiles.profile import load
@@ -201,17 +201,21 @@ def test_who_waits_for_a_value_is_refused_when_the_bench_is_closed() -> None:
 
 
 @pytest.mark.parametrize("setting", ["process.raft_layers=3", "process.complete_objects=true", "process.skirt_loops=3"])
-def test_how_copies_stand_is_worked_out_again_for_what_decides_their_places(setting: str) -> None:
+def test_how_copies_stand_is_worked_out_again_for_what_decides_their_places(
+    setting: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("machine.workbench.session.planes.REST_S", 0.0)
+
     async def change_setting() -> list[Bench]:
         bench, stood = Bench(PROFILE, model=model(), copies=3), list[Bench]()
         session = SessionBase(bench, WorkerPools())
 
-        async def run(task: Any, standing: Bench, *files: Path) -> Standing:
+        async def run(task: Any, standing: Bench, *files: Path) -> Plated:
             stood.append(standing)
-            return Standing((40.0, 10.0, 40.0), 0.0, "")
+            return Plated()
 
-        session.hand.run = run  # type: ignore[assignment, method-assign]
-        standing_of(session)
+        session.aside.run = run  # type: ignore[assignment, method-assign]
+        plated_of(session)
         for changed in (bench, replace(bench, profile=load(settings=[setting]))):
             session.become(replace(session.history, now=Step("", changed)))
             await asyncio.sleep(0.01)
