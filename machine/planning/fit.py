@@ -189,7 +189,7 @@ def _head_below(machine: Machine, height_mm: float) -> Iterator[tuple[Floats, Fl
 
 
 class Misfit(NamedTuple):
-    """The index of the box without a place; the number already placed; whether it would fit but for the head."""
+    """The index of the box without a place; the number already placed; whether all would fit but for the head."""
 
     number: int
     standing: int

@@ -329,7 +329,18 @@ def test_models_that_the_head_cannot_pass_are_refused_with_what_goes() -> None:
     with pytest.raises(PlanError) as refused:
         on_one_plate(models, plate("process.complete_objects=true"))
     assert "that the head reaches without hitting them" in str(refused.value)
-    assert str(refused.value).endswith("process.complete_objects = false prints them layer by layer")
+    wanted = "process.complete_objects = false prints them layer by layer; or print fewer copies, or set a smaller process.scale"
+    assert str(refused.value).endswith(wanted)
+
+
+def test_models_that_would_fit_but_for_the_head_are_refused_with_that_cause_even_where_no_free_place_is_left() -> None:
+    models = [decomposed(whole(box(60 + k, 60, 70 + k)), name=f"box {k}") for k in range(3)]
+    on_one_plate(models, plate())  # layer by layer there is room for all
+    with pytest.raises(PlanError) as refused:
+        on_one_plate(models, plate("process.complete_objects=true"))
+    place, _, cause = str(refused.value).partition(" that the head reaches without hitting them: ")
+    assert place.endswith("has no place for it beside another one")
+    assert cause.startswith("models are printed one after another")
 
 
 def test_a_model_without_room_is_named_with_the_room_that_it_needs() -> None:
