@@ -22,14 +22,12 @@ from machine.pipeline.requests import ModelRequest
 from machine.planning.fit import Place, standing_at
 from machine.workbench.bench.bench import Bench, plan_of_bench
 from machine.workbench.bench.model import Model, mesh_blocks
-from machine.workbench.work.cutting import PLAN_NAME, cut_bench
+from machine.workbench.work.cutting import cut_bench, in_one_piece
 from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition
 from mdp.mesh import Mesh, together
 from mdp.model_file import DEMO
 from mdp.pedestal import on_pedestal
-from mdp.ranking.ranker import CLASSIC
-from mdp.search.parts import one_piece
 from profiles.errors import MeshError
 from profiles.files import write_whole
 from profiles.part_settings import PartSettings
@@ -42,7 +40,7 @@ Cut = tuple[Decomposition, list[PartSettings]]  # another model, and the setting
 def plated(bench: Bench, others: Path, report: Callable[[str], None]) -> tuple[Decomposition, Profile]:
     """The parts of all models on the plate, as for `export MODEL:COPIES ...`, and the profile to print them with. others: the
     file of the other models' parts, which receives those that it lacks."""
-    cut = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+    cut = cut_bench(bench, plan_of_bench(bench))
     if not bench.beside:
         return on_one_plate([cut] * bench.copies, as_turned(bench.profile, bench.turned))
     profile, known = bench.profile.of_all_parts, known_cuts(others)
@@ -93,13 +91,11 @@ def places_on_plate(mesh: Mesh, bench: Bench, others: Path, drawn: Path) -> tupl
     assert bench.model is not None
     (x, y), machine, height_mm = bench.profile.process.place_mm, bench.profile.machine, bench.profile.search.pedestal_mm
 
-    def uncut(name: str, mesh: Mesh) -> Decomposition:
-        return Decomposition(name, mesh, (one_piece(mesh, machine),), 1, CLASSIC, 0.0, 0.0, 0, 0, 0.0)
-
-    cut = cut_bench(bench, plan_of_bench(bench, PLAN_NAME)) if bench.parts > 1 else uncut(bench.model.name, mesh)
+    cut = cut_bench(bench, plan_of_bench(bench)) if bench.parts > 1 else in_one_piece(bench.model.name, mesh, machine)
     models, known = [cut] * bench.copies, known_cuts(others) if bench.beside else {}
     for model, copies in bench.beside:
-        own = known[model.key][0] if model.key in known else uncut(model.name, on_pedestal(model.mesh(), height_mm))
+        lifted = on_pedestal(model.mesh(), height_mm)
+        own = known[model.key][0] if model.key in known else in_one_piece(model.name, lifted, machine)
         models += [own] * copies
     places, plate = places_of(models, bench.profile)
     shifts = [(at_x - x, at_y - y) for at_x, at_y in places]
