@@ -147,14 +147,6 @@ def test_a_pause_that_is_wanted_before_the_nozzle_is_hot_waits_for_it_so_that_no
     assert "it pauses once it is hot" in [progress.message for progress in watcher.shown if progress.state == "pausing"][:2]
 
 
-def test_a_pause_waits_until_filament_can_be_pulled_though_the_nozzle_is_close_to_a_low_target() -> None:
-    low = [line.replace("S200", "S175") for line in PROGRAM]
-    watcher = watched({5: Command.PAUSE, "paused": Command.RESUME})
-    assert not watcher.run(low).cancelled
-    (paused, *_) = [progress for progress in watcher.shown if progress.state == "paused"]
-    assert paused.temperature.nozzle_c >= 170.0  # below it Marlin pulls none
-
-
 def test_a_pause_at_a_nozzle_that_the_program_holds_cold_begins_and_moves_no_filament() -> None:
     start = [line.replace("S200", "S150") for line in START]
     moves = [f"G0 X{10 + k % 7} Y{10 + k % 5}" for k in range(40)]
