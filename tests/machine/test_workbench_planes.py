@@ -527,3 +527,22 @@ def test_a_number_below_the_slider_keeps_the_focus_when_it_is_taken(browser: Bro
         page.until(lambda state: state["parts"] == 1)
         browser.wait(f"$('front').value === '0' && {FREE}")
         assert browser.value("document.activeElement.textContent") == "1"
+
+
+def test_on_a_phone_the_offset_of_a_plane_is_shown_whole(browser: Browser, bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 27.14)
+        looked_at(browser, bench, "tee.stl")
+        browser.resize(390, 844)
+        browser.value("document.querySelector(\"#parts-list input[value='2']\").click()")
+        browser.wait("!$('plane-tools').hidden && $('plane-offset').value === '27.14'")
+        room_px, text_px, buttons = browser.value(
+            "(() => { const field = $('plane-offset'), style = getComputedStyle(field), text = document.createElement('span');"
+            "Object.assign(text.style, { position: 'absolute', fontFamily: style.fontFamily, fontSize: style.fontSize });"
+            "text.textContent = '-127.14'; document.body.append(text); const width = text.offsetWidth; text.remove();"
+            "return [field.clientWidth - 2 * parseFloat(style.paddingLeft), width, style.appearance]; })()"
+        )
+        assert (room_px >= text_px, buttons) == (True, "textfield")  # without the buttons that step it, which cover its end
+        assert browser.value("$('plane-tools').offsetHeight < 90")  # still one row, and one of figures
+        browser.resize(1280, 800)
