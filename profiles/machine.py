@@ -118,6 +118,9 @@ class Table(Frozen):
     def _problems(self) -> Iterable[str]:
         if self.size_mm is not None and min(self.size_mm) <= 0:
             yield f"size_mm is {list(self.size_mm)}: both numbers must be above 0"
+        for box in self.clips:
+            if box.max_mm[2] <= 0.0:
+                yield f"clips: box {box.name} ends at z {box.max_mm[2]:g} mm: it must rise above the plate, z 0"
 
 
 class Blocks(Frozen):

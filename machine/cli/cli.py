@@ -25,6 +25,8 @@ from profiles.errors import UserError, causes, notes
 
 ASKED_BY_SHELL = "_TILTPRINT_COMPLETE"  # set by the script of --install-completion, which expects completions
 FULL = (errno.ENOSPC, errno.EDQUOT)
+# Name of a command in other programs -> the command that does the same here.
+ELSEWHERE = {"slice": "export", "cut": "decompose", "check": "simulate", "preview": "view", "gui": "edit", "open": "edit"}
 # Type of a pydantic error -> what the value must be.
 EXPECTED = {
     "int_parsing": "a whole number",
@@ -156,7 +158,7 @@ def _usage(error: TyperException, given: Sequence[str]) -> str:
 
 
 def _unknown(what: str, word: str, command: str, known: Sequence[str]) -> str:
-    near = get_close_matches(word, known, 1)
+    near = [ELSEWHERE[word]] if ELSEWHERE.get(word) in known else get_close_matches(word, known, 1)
     hint = f" (did you mean {near[0]}?)" if near else ""
     return f"{what} {word} is not known{hint}: {command} knows {', '.join(known)}"
 

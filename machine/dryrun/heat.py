@@ -13,7 +13,7 @@ from machine.gcode.words import quote
 from mdp.mesh import Floats
 from profiles.errors import counted
 from profiles.machine import Machine
-from profiles.messages import key_name
+from profiles.messages import key_name, phrase
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -196,7 +196,8 @@ def _profile(program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
         count = len(machine.uncalibrated)
         which = counted(count, "value is a guess", "values are guesses")
         names = ", ".join(map(key_name, machine.uncalibrated))
-        message = f"{machine.name} is not calibrated: {which} (see docs/calibration.md): {names}"
+        see = phrase("calibration", "(see docs/calibration.md)")
+        message = f"{machine.name} is not calibrated: {which} {see}: {names}"
         yield Finding("warning", "uncalibrated", 0, 0, 0, message)
     for line, part, area in program.unsupported:
         where = f", most of them in layer {area.layer}" if area.layer else ""

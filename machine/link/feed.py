@@ -76,7 +76,8 @@ class Feed:
     def run(self, lines: Iterable[str], resume_point: ResumePoint | None = None) -> None:
         """Feed the program from its beginning, or from the resume point of an interrupted print, to the final barrier."""
         exchange = self.exchange
-        if not exchange.connection.greeting.capabilities.get("BABYSTEPPING", True):
+        shifts_z = resume_point is None or resume_point.shifts_z
+        if not (shifts_z and exchange.connection.greeting.capabilities.get("BABYSTEPPING", True)):
             self.pending.babystep = ""
         if resume_point is not None and resume_point.z_offset_mm and not self.pending.babystep:
             offset = f"{resume_point.z_offset_mm:+g} mm"

@@ -200,7 +200,7 @@ def percent_refusal(value: float, bounds: tuple[float, float]) -> str | None:
 def offset_refusal(wanted_mm: float, babystep: str) -> str | None:
     """Why a Z offset cannot be had, None when it can. babystep: the firmware's command for it."""
     if not babystep:
-        return "no Z offset: this firmware cannot shift Z during a print (Marlin needs BABYSTEPPING)"
+        return "no Z offset: this firmware cannot shift Z now (Marlin needs BABYSTEPPING, and Z homed since it started)"
     allowed = f"{-MOST_OFFSET_MM:g} to {MOST_OFFSET_MM:g} mm are allowed"
     return None if abs(wanted_mm) <= MOST_OFFSET_MM else f"a Z offset of {wanted_mm:.3g} mm is not possible: {allowed}"
 

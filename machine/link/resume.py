@@ -73,6 +73,7 @@ class ResumePoint:
     reason: str = ""  # in words
     homes: bool = False  # X and Y
     z_offset_mm: float = 0.0  # that the firmware has after these commands
+    shifts_z: bool = True  # whether the firmware can change it
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,8 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     again = homes_z(profile.machine)
     words = f"; its Z offset of {offset_mm:+g} mm is {'set again' if again else 'kept'}" if offset_mm else ""
     held_mm = offset_mm if again else 0.0  # else the axis itself has it
-    return ResumePoint(point.line, before, f"the printer has restarted; {span}{words}", homes=True, z_offset_mm=held_mm)
+    reason = f"the printer has restarted; {span}{words}"
+    return ResumePoint(point.line, before, reason, homes=True, z_offset_mm=held_mm, shifts_z=again)
 
 
 def _offset_in_words(offset_mm: float) -> str:

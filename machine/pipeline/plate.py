@@ -104,9 +104,12 @@ def places_of(models: Sequence[Decomposition], profile: Profile) -> tuple[list[P
     alone = [(k, n) for k in lowest_first for n in range(1 if together else 0, len(models[k].parts))]
     brim_mm, sizes = _brim_mm(models, profile), [_size_mm(model.mesh) for model in models]
     gap_mm = _gap_mm(profile.process, brim_mm)
-    plate = Plate([about_axis[model] for model in models], together, alone, profile, brim_mm, sizes, gap_mm)
+    centred = [about_axis[model] for model in models]
+    plate = Plate(centred, together, alone, profile, brim_mm, sizes, gap_mm)
     found = plate.arrange()
     if isinstance(found, Misfit):
+        without_head = Plate(centred, together, [], profile, brim_mm, sizes, gap_mm).arrange()
+        found = without_head if isinstance(without_head, Misfit) else found._replace(is_met=True)
         raise PlanError(_reason(found, models, sizes, gap_mm, profile))
     return found, plate
 
@@ -150,10 +153,14 @@ def _reason(misfit: Misfit, models: Sequence[Decomposition], sizes_mm: Sequence[
         what = f"{len(models)} copies: {what}"
     if misfit.is_met:
         others = "another one" if misfit.standing == 1 else f"{misfit.standing} others"
+        why = "parts are printed one after another, and the head needs room around those that stand"
         wanted = f"{phrase('one part', '--parts 1 prints each in one piece')}, all layer by layer"
         if profile.process.complete_objects:
+            why = "models are printed one after another, and the head needs room around those that stand"
             wanted = f"{key_name('process.complete_objects')} = false prints them layer by layer"
-        return f"{what} no place beside {others} that the head reaches without hitting them: {wanted}"
+        wanted += f"; or print fewer copies, or set a smaller {key_name('process.scale')}"
+        beside = f" beside {others if misfit.standing else 'others'}"
+        return f"{what} no place for it{beside} that the head reaches without hitting them: {why}; {wanted}"
     if alike:
         return f"{what} room for {misfit.standing} with {gap_mm:g} mm between them"
     if misfit.standing == 0:

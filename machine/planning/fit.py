@@ -182,14 +182,14 @@ def _head_below(machine: Machine, height_mm: float) -> Iterator[tuple[Floats, Fl
         if isinstance(body, Block):
             if body.min_mm[2] < height_mm + body.need_mm:
                 yield np.array(body.min_mm[:2]), np.array(body.max_mm[:2]), body.need_mm
-        elif (
-            radius := max((radius for radius, low_mm in body.discs_mm if low_mm < height_mm + body.need_mm), default=0.0)
-        ) > 0.0:
+        elif body.discs_mm[0][1] < height_mm + body.need_mm:
+            radii, lows_mm = np.transpose(body.discs_mm)
+            radius = float(np.interp(height_mm + body.need_mm, lows_mm, radii))
             yield np.full(2, -radius), np.full(2, radius), body.need_mm
 
 
 class Misfit(NamedTuple):
-    """The index of the box without a place; the number already placed; whether it would fit but for the head."""
+    """The index of the box without a place; the number already placed; whether all would fit but for the head."""
 
     number: int
     standing: int

@@ -1,5 +1,5 @@
 """Layer: a layer's strokes as moves, as fast as axes, extruder and hot end allow, and the travels between them: retraction with a
-wipe, lift, and crossing at a height at which the head clears the print beside a limb.
+wipe, lift, and crossing at a height at which the head clears clips and the print beside a limb.
 
 Filament that replaces what oozed during a turn of the table is pushed within an inner stroke, not at standstill. How much oozed
 is unknown. At the beginning of a wall, excess filament would leave a blob on the seam; spread over the first stretch of infill or
@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
-from math import inf, nan, pi, sqrt
+from math import ceil, inf, nan, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +26,7 @@ from mdp.mesh import Floats, Indices
 from mdp.overhang import Mask
 from mdp.pose import Pose
 from profiles.errors import MoveError
-from profiles.machine import Machine
+from profiles.machine import Machine, TableBox
 from profiles.profile import Profile
 from slicer.estimate.timing import Speeds, speeds_of
 from slicer.geometry.polyline import length_between
@@ -50,8 +50,8 @@ class Tip:
     """Position of the tip (machine X Y Z), pose of the table, hull of the earlier parts, and all moves so far.
 
     trail: (n, 3) path of a wipe over the strokes since the last retraction. run_in_mm: filament that the next inner strokes are
-    to push in addition. limb: while a limb is printed, its part number and the print beside it. has_limbs: a limb has been
-    printed, so that the print may be higher than the tip.
+    to push in addition. beside: the index of a part with obstacles beside it (a limb's other pieces, clips), and these.
+    has_limbs: a limb has been printed, so that the print may be higher than the tip.
     """
 
     profile: Profile
@@ -63,7 +63,7 @@ class Tip:
     prime_extra_mm: float = 0.0
     run_in_mm: float = 0.0
     trail: Floats = field(default_factory=lambda: NOWHERE)
-    limb: tuple[int, StandingColumns] | None = None
+    beside: tuple[int, StandingColumns] | None = None
     moves: list[Moves] = field(default_factory=list)
     marks: list[Mark] = field(default_factory=list)
 
@@ -97,13 +97,13 @@ class Tip:
 def height_to(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: Floats) -> float:
     """Z at which the tip crosses along an approach (k, 2) to a stroke's start, retracted if `retracts`.
 
-    Within a limb the tip retracts and lifts wherever the head would hit the print beside the limb.
+    The tip retracts and lifts wherever the head would hit a clip or the print beside a limb.
     """
     if retracts:
         retract(tip)
     lift, level = tip.profile.process.lift_mm if retracts else 0.0, float(start[2])
     over = max(level, min(level + lift, tip.profile.machine.z.limits_mm[1]))
-    if tip.limb is None:
+    if tip.beside is None:
         return over
     clear = _over_standing(tip, approach, start, shift, over)
     if clear > over and not retracts:
@@ -113,10 +113,10 @@ def height_to(tip: Tip, start: Floats, approach: Floats, retracts: bool, shift: 
 
 
 def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, over: float) -> float:
-    """Z at which the head clears the print beside a limb on the way to a path's start. `over` if that suffices, else the least
-    sufficient height with the clearance of the nozzle."""
-    assert tip.limb is not None
-    (part, standing), machine = tip.limb, tip.profile.machine
+    """Z at which the head clears the obstacles beside the part on the way to a path's start. `over` if that suffices, else the
+    least sufficient height with the clearance of the nozzle."""
+    assert tip.beside is not None
+    (part, standing), machine = tip.beside, tip.profile.machine
     way = np.vstack([tip.at_mm[:2], approach, start[:2]])
     z_mm = clear_height_mm(standing, way - shift[:2], over - float(shift[2])) + float(shift[2])
     if z_mm <= over + STANDING_MM:
@@ -124,7 +124,7 @@ def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, ove
     z_mm += machine.clearance_mm
     if z_mm > machine.z.limits_mm[1]:
         raise MoveError(
-            f"part {part}: a way within it needs the tip at Z {z_mm:.1f} mm for the head to pass the print beside the part, "
+            f"part {part}: a way within it needs the tip at Z {z_mm:.1f} mm for the head to pass what stands beside it, "
             f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm"
         )
     return z_mm
@@ -255,14 +255,17 @@ def _trail_after(laid: Laid, k: int, before: Floats, wipe_mm: float) -> Floats:
     return trail[:count]
 
 
-def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> StandingColumns:
-    """The printed beads above the base plane of a limb, in its frame.
+def standing_beside(printing: Part, printed: Sequence[tuple[Part, SlicedPart]], machine: Machine) -> StandingColumns:
+    """The printed beads and the clips above the base plane of a part, in its frame.
 
-    Beads less than their width above the plane are left out: they are the steps of the cut face below the limb.
+    Beads less than their width above the plane are left out: they are the steps of the cut face below a limb.
     """
     tops, widest_mm = [np.zeros((0, 3))], 0.0
+    for clip in machine.table.clips:
+        placed = _lattice(clip) @ printing.rotation.T - (0.0, 0.0, printing.base.offset_mm)
+        tops.append(placed[placed[:, 2] > 0.0])
     for part, piece in printed:
-        turn, shift = frame_change(part, limb)
+        turn, shift = frame_change(part, printing)
         for layer in piece.layers:
             placed, width_mm = layer.points_mm @ turn.T + shift, np.repeat(layer.width_mm, np.diff(layer.starts))
             high = placed[:, 2] > width_mm
@@ -275,8 +278,15 @@ def standing_beads(limb: Part, printed: Sequence[tuple[Part, SlicedPart]], machi
     return StandingColumns.of(highest_in_cells(np.concatenate(tops), STEP_MM), slack_mm, machine)
 
 
+def _lattice(box: TableBox) -> Floats:
+    """(n, 3) points throughout a box, at most STEP_MM apart along each axis."""
+    counts = [ceil((most - least) / STEP_MM) + 1 for least, most in zip(box.min_mm, box.max_mm, strict=True)]
+    axes = [np.linspace(a, b, count) for a, b, count in zip(box.min_mm, box.max_mm, counts, strict=True)]
+    return np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, 3)
+
+
 def clear_height_mm(standing: StandingColumns, way_mm: Floats, height_mm: float) -> float:
-    """The least height, at least height_mm, at which the tip may move along a path (n, 2) in the limb's frame."""
+    """The least height, at least height_mm, at which the tip may move along a path (n, 2) in the part's frame."""
     return max(height_mm, float(standing.least_tip_mm(_resampled(way_mm)[0], height_mm).max()))
 
 
@@ -305,7 +315,7 @@ def print_layer(tip: Tip, layer: Layer, points: Floats, shift: Floats, *, on_pla
     laid = Laid(points, starts, layer.width_mm, layer.wiped, layer.approach + shift[:2], layer.approach_starts)
     firsts = points[starts[:-1]]
     apart = np.linalg.norm(firsts - np.vstack([tip.at_mm, points[starts[1:-1] - 1]]), axis=1) > STANDING_MM
-    alone = apart if tip.limb is not None else apart & layer.retract  # a stroke may begin at the end of the one before it
+    alone = apart if tip.beside is not None else apart & layer.retract  # a stroke may begin at the end of the one before it
     ways = np.concatenate([[0], np.cumsum(strokes.rows[:, POINTS].astype(np.int64))])
     for a, b in pairwise([0, *(np.flatnonzero(alone[1:]) + 1).tolist(), len(layer)]):
         over = float(firsts[a, 2])

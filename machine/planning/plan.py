@@ -11,7 +11,7 @@ import numpy as np
 from machine.kinematics.collision import Printed, hull, join_hulls
 from machine.kinematics.table import machine_points, part_shift, workpiece_points
 from machine.planning import limits
-from machine.planning.layer import Tip, go, print_layer, retract, standing_beads
+from machine.planning.layer import Tip, go, print_layer, retract, standing_beside
 from machine.planning.limits import axis_limits
 from machine.planning.moves import TRAVEL, BeginLayer, BeginPart, MachineProgram, Pause, Reorient
 from machine.planning.stand import Turn, beside, find_park_position, is_way_clear, obstacle_top_mm, over_print_mm, route
@@ -59,7 +59,10 @@ def plan(
         across_mm = _turned(tip, part.pose, target, part.index) if printed else _begin(tip, begin, target, lanes)
         tip.mark(begin)
         _go_down(tip, target, across_mm)
-        tip.limb = (part.index, standing_beads(part, done, machine)) if is_limb else None
+        if is_limb or machine.table.clips:
+            tip.beside = part.index, standing_beside(part, done if is_limb else [], machine)
+        else:
+            tip.beside = None
         _print_layers(tip, part, piece, shift, stopped)
         printed.append(_outline(part, piece, shift, machine))
         tip.printed = join_hulls(printed)

@@ -270,12 +270,16 @@ def _reason_text(problem: Problem, node: Node, plane: Plane, limits: Bounds, rea
         case Reason.PLATFORM:
             least, offset = f"{ceil(10.0 * limits.least_offset_mm[0]) / 10.0:g}", f"{plane.offset_mm:.3g}"
             by_file = f"offset_mm must be at least {least} (now {offset})"
-            text += f"; {phrase('page', by_file, f'move it to {least} mm or more (now {offset})')}"
+            text += f"; {phrase('page', by_file, f'move it to {least} mm or more at this tilt (now {offset})')}"
         case Reason.REACH:
             text += f" of its normal on {problem.machine.name}"
         case Reason.CLEARANCE:
             needed, body, _ = min(lowest_body(problem.machine, pose) for pose in poses(problem.machine, plane.normal))
             text = f"the head's {body} would meet the table: what is cut off must begin at least {needed:.1f} mm above it"
+            top_mm = float(problem.mesh.bounds_mm[1, 2])
+            if needed >= top_mm:
+                which = "this model" if problem.limits.least_height_mm.min() >= top_mm else "this model at this tilt"
+                text += f", and the model is {top_mm:.1f} mm high: {problem.machine.name} cannot cut {which}"
         case Reason.INTERFACE:
             text = "a piece of it would float: nothing printed before lies below it"
         case Reason.FRAGILE:

@@ -114,6 +114,10 @@ class Firefox:
         actions = [{"type": kind, "value": KEYS.get(key, key)} for kind in ("keyDown", "keyUp")]
         self._send("input.performActions", context=self._page, actions=[{"type": "key", "id": "keys", "actions": actions}])
 
+    def resize(self, width: int, height: int) -> None:
+        """Another size of the window, in CSS pixels."""
+        self._send("browsingContext.setViewport", context=self._page, viewport={"width": width, "height": height})
+
     def screenshot(self, path: Path | None = None) -> bytes:
         """The window as PNG."""
         picture = base64.b64decode(self._send("browsingContext.captureScreenshot", context=self._page)["data"])
@@ -133,7 +137,7 @@ class Firefox:
         self._send("session.new", capabilities={})
         self._page = self._send("browsingContext.getTree")["contexts"][0]["context"]
         self._send("session.subscribe", events=["log.entryAdded", "network.beforeRequestSent"])
-        self._send("browsingContext.setViewport", context=self._page, viewport={"width": size[0], "height": size[1]})
+        self.resize(*size)
 
     def _end(self) -> None:
         """No process and no folder stays, whatever has happened."""

@@ -127,6 +127,21 @@ def test_firefox_drags_tilts_and_locks_a_plane_and_finds_the_others_beside_a_mar
     assert firefox.complaints == []
 
 
+@pytest.mark.parametrize("size", [(390, 844), (900, 560)])
+@pytest.mark.parametrize(("tab", "fields"), [("model", ["turn-x-typed", "size-x"]), ("parts", ["plane-offset", "plane-tilt"])])
+def test_firefox_shows_every_figure_of_a_number(firefox: Firefox, size: tuple[int, int], tab: str, fields: list[str]) -> None:
+    firefox.resize(*size)
+    firefox.click(f"#tab-{tab}")
+    firefox.wait(f"innerWidth === {size[0]} && {fields}.every((id) => $(id).offsetWidth)")
+    cut_off = "(e, before) => { e.value = '100.25'; const wide = e.scrollWidth > e.clientWidth; e.value = before; return wide; }"
+    assert firefox.value(f"{fields}.filter((id) => ({cut_off})($(id), $(id).value))") == []
+
+
+def test_firefox_draws_a_slider_that_does_not_move_fainter(firefox: Firefox) -> None:
+    opacity = "((e, off) => { e.disabled = off; return getComputedStyle(e).opacity; })"
+    assert firefox.value(f"[true, false].map((off) => {opacity}($('apart'), off))") == ["0.5", "1"]
+
+
 def test_firefox_changes_settings_of_all_parts_and_of_one(firefox: Firefox) -> None:
     firefox.click("#tab-settings")
     put_setting(firefox, "process.walls", 1)

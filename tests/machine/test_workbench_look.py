@@ -211,6 +211,6 @@ def test_a_key_slices_the_preview_opens_by_itself_and_a_key_saves(browser: Brows
         "{ const make = URL.createObjectURL; URL.createObjectURL = (one) => { window.saved = one; return make(one); }; }"
     )
     control(browser, "g")
-    browser.wait("window.saved")
+    browser.wait("window.saved && $('notice').textContent === 'saved post.gcode'")
     browser.click("#leave-print")
     assert browser.value(MAIN) == ["verdict-print"]

@@ -306,7 +306,7 @@ def test_a_plane_dragged_where_it_cannot_be_cut_stays_at_the_last_place_where_it
     browser.release((x, y - 900))
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: move a plane' && $('problem').hidden")
     browser.wait(f"$('plane-offset').value === '{allowed[0]}'")
-    assert "misses the model" in browser.value("$('plane-told').textContent")  # to be read after the hand has let go
+    assert "misses the model" not in browser.value("$('plane-told').textContent")  # it is back where it can be cut
     browser.wait("$('plane-told').textContent.includes('mm of seams')")
     assert browser.value("document.documentElement.dataset.obstacle") == ""
 

@@ -11,9 +11,8 @@ from tests.shapes import box, tee
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
-ROWS = (
-    "JSON.stringify([...$('plate-list').children].map((row) => [row.firstChild.textContent, row.querySelector('input').value]))"
-)
+ROWS = """JSON.stringify([...$('plate-list').children].map(
+  (row) => [row.firstChild.firstChild.data, row.querySelector('input').value]))"""
 COPIES = "document.querySelector('#plate-list li:last-child input')"
 
 
@@ -48,4 +47,41 @@ def test_a_model_is_added_drawn_counted_taken_off_the_plate_and_there_after_a_re
     browser.click("#add-opened")
     waits_for_rows(browser, '[["first.stl","1"],["second.stl","3"],["third.stl","1"]]', "All 5 stand on the plate.")
     browser.wait("$('add-opened').hidden")
+    assert browser.complaints == []
+
+
+def red_share(browser: Browser) -> float:
+    """How much of the picture is as red as models without a place."""
+    red, green, blue = (pixels(browser)[:, :, channel].astype(int) for channel in range(3))
+    return float(((red > 130) & (green < 70) & (blue < 70)).mean())
+
+
+def test_models_without_a_place_are_drawn_in_red_beside_the_plate_and_nothing_can_be_sliced(
+    browser: Browser, bench: Running
+) -> None:
+    open_model(browser, bench, "crowd.stl", stl(box(60, 60, 20)))
+    browser.click("#tab-slices")
+    assert red_share(browser) == 0.0
+    assert not browser.value("$('slice').disabled")
+    browser.value("{ $('copies').value = 12; $('copies').dispatchEvent(new Event('change')); }")
+    browser.wait("$('copies-told').textContent.includes('12 copies: crowd.stl measures 60.0 x 60.0 mm')")
+    browser.wait("$('unsliceable').checkVisibility() && $('unsliceable').textContent.includes('has room for')")
+    assert browser.value("$('slice').disabled && $('slice').checkVisibility()")
+    assert red_share(browser) > 0.02
+    browser.click("#undo")
+    browser.wait("$('copies-told').textContent === '' && !$('slice').disabled")
+    assert red_share(browser) == 0.0
+    assert browser.complaints == []
+
+
+def test_the_page_says_that_a_scale_is_that_of_all_models_and_lists_the_size_of_each(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "scaled.stl", stl(tee()))
+    browser.click("#tab-model")
+    assert browser.value("$('scale-told').hidden")
+    choose(browser, "cube.stl", stl(box(20, 20, 20)), "add-file")
+    browser.wait("$('plate-list').children.length === 2 && $('scale-told').checkVisibility()")
+    browser.value("{ $('scale').value = 50; $('scale').dispatchEvent(new Event('change')); }")
+    browser.wait("$('undo').ariaLabel === 'undo: scale all models on the plate'")
+    sizes = "JSON.stringify([...$('plate-list').querySelectorAll('small')].map((one) => one.textContent))"
+    browser.wait(f'{sizes} === \'["20.0 × 5.0 × 20.0 mm","10.0 × 10.0 × 10.0 mm"]\'')
     assert browser.complaints == []

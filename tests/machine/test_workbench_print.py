@@ -207,13 +207,20 @@ def test_on_a_phone_nothing_covers_print_now_and_a_print_is_followed_in_a_pictur
         browser.value("{ for (let k = 0; k < 20; k++) $('run-checks').append(document.createElement('li')); }")
         on_top = "(({ x, y, height }) => document.elementFromPoint(x + 20, y + height - 2)?.id)($('%s').getBoundingClientRect())"
         assert browser.value(on_top % "begin") == "begin"
+        sign, amber = browser.value("(({ listStyleType, color }) => [listStyleType, color])(getComputedStyle($('run-findings')))")
+        assert (sign, amber) == ('"⚠ "', "rgb(154, 91, 0)")
         browser.press(*browser.middle("#begin"))
         browser.wait(f"{PRINTING} === 'printing' && !$('follow').hidden")
         assert browser.value(on_top % "pause") == "pause"
+        browser.click("#cancel")  # asks first, and the emergency stop looks as it works meanwhile
+        assert browser.value("getComputedStyle($('sure'), '::backdrop').backgroundColor") == "rgba(0, 0, 0, 0)"
+        assert browser.value(on_top % "emergency") == "emergency"
+        browser.click("#go-on")
         browser.value("$('follow').scrollIntoView({ block: 'center' })")
         assert browser.value(on_top % "follow") == "follow"
         browser.press(*browser.middle("#follow"))
         browser.wait(f"['ready', 'failed'].includes({VIEW}?.documentElement?.dataset.state)")
+        browser.wait("(({ top, bottom }) => top > -5 && bottom > 150)($('scene').getBoundingClientRect())")  # scrolled there
         readouts = ("readouts", "legend")
         assert not [name for name in readouts if browser.value(f"{VIEW}.getElementById('{name}').checkVisibility()")]
         assert browser.value(f"{VIEW}.getElementById('canvas').clientHeight") > 150

@@ -3,6 +3,7 @@
 import json
 from typing import Any
 
+import manifold3d as m3
 import pytest
 from numpy import cos, radians, sin
 
@@ -11,7 +12,7 @@ from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.running_workbench import Running
 from tests.machine.test_workbench_page import open_model
 from tests.machine.test_workbench_place import pixels
-from tests.shapes import ball, box
+from tests.shapes import ball, box, standing
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
@@ -165,3 +166,24 @@ def test_a_ring_turns_the_model_the_way_of_the_hand(browser: Browser, bench: Run
     assert browser.value(f"{STORE}.state.rotation")["xyz".index(axis) - 2]["xyz".index(axis) - 1] < -0.8  # -sin 60
     browser.click("#undo")
     browser.wait(f"{STORE}.state.rotation[0][0] === 1 && {IDLE}")
+
+
+def test_parts_have_their_colours_on_every_tab_beside_the_legend_even_where_one_is_a_single_limb(
+    browser: Browser, bench: Running
+) -> None:
+    posts = [m3.Manifold.cube((8.0, 8.0, 40.0)).translate((x, 0.0, 0.0)) for x in (0.0, 32.0)]
+    open_model(browser, bench, "two_posts.stl", stl(standing(m3.Manifold.cube((40.0, 8.0, 6.0)) + posts[0] + posts[1])))
+    with bench.line() as page:
+        page.do("add", normal=[0, 0, 1], offset_mm=20.0)
+        page.until(lambda state: state["parts"] == 2)
+        page.do("limb", part=2, point_mm=[16.0, 0.0, 40.0])
+        page.until(lambda state: state["cuts"][0].get("limbs_mm"))
+    for tab in ("slices", "settings", "printing"):
+        browser.click(f"#tab-{tab}")
+        browser.wait("$('legend').children.length === 3 && document.documentElement.dataset.pieces === '2'")
+        drawn = pixels(browser).astype(int)
+        coloured = (drawn[:, :, 0] - drawn[:, :, 2] > 100).mean()  # orange, the second part's
+        assert coloured > 0.004, tab
+    browser.click("#tab-model")
+    browser.wait("$('legend').children.length === 0")
+    assert browser.complaints == []

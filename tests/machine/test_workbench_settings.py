@@ -54,6 +54,9 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     put(browser, "process.walls", 5)
     browser.wait(changed("process.walls"))
     assert browser.value("$('settings-part').selectedOptions[0].text") == "part 1 (1 changed)"
+    choose_part(browser, 0)
+    browser.wait("$('only-changed').textContent.endsWith(' changed, 1 of parts')")
+    choose_part(browser, 1)
     command_line = browser.value("$('command-line').textContent")
     assert (
         "--set 'machine.tilt.limits_deg=[-45, 45]' --set process.top_layers=7 --parts 1 --as-is --part 1:walls=5"
@@ -62,6 +65,7 @@ def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(bro
     browser.click("#reset-settings")
     browser.wait("$('reset-settings').disabled && $('settings-part').selectedOptions[0].text === 'part 1'")
     choose_part(browser, 0)
+    browser.wait("$('only-changed').textContent.endsWith(' changed')")
     browser.wait(changed("machine.tilt.limits_deg"))
     browser.click("#undo")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: set a part'")

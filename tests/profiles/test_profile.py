@@ -137,6 +137,10 @@ def test_a_share_is_also_read_as_a_percentage() -> None:
             "machine.table.clips.0: box clip: min_mm must be below max_mm on every axis",
         ),
         (
+            'machine.table.clips=[{name="screw",min_mm=[5,80,-20],max_mm=[9,90,-5]}]',
+            "machine.table.clips: box screw ends at z -5 mm: it must rise above the plate, z 0",
+        ),
+        (
             'machine.head.boxes=[{name="fan",min_mm=[0,0,-1],max_mm=[1,1,1]}]',
             "machine.head.boxes.0: box fan: min_mm z is -1: no body may hang below the tip",
         ),

@@ -1,7 +1,7 @@
 """Models in one piece and in parts: `python tools/bench/benchmark.py FILE_OR_FOLDER ... [--longest MM] [--log FILE]`.
 
 Each model is printed with support and dry-run in five ways, a row each: in one piece in its best orientation, the same piece by
-PrusaSlicer, in our parts, and in the parts of the search published in 2020, with its classic and with the learned ranking. The
+PrusaSlicer, in our parts, and in the parts of the published search (2020), with its classic and with the learned ranking. The
 searches begin with the best orientation of one piece; ours may turn it. All get the same layers, line widths, walls, infill and
 speeds, and one reader measures all G-code. `--log` appends each row at once and skips the models that the file has.
 """

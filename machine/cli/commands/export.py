@@ -139,7 +139,10 @@ def save(request: ModelRequest, out: Path) -> int:
     write_bytes(out, project_bytes(_project(request, decomposed), decomposed.plan, decomposition.mesh, picture))
     count = len(decomposed.plan.parts) + 1
     command = shlex.join(["tiltprint", "export", str(out)])
-    contents = f"{request.name} {in_parts(count)}, with its plan and profiles; {command} makes its G-code"
+    contents = (
+        f"{request.name} {in_parts(count)}, {decomposition.residual_area_mm2:.0f} mm² need support, with its plan and profiles; "
+        f"{command} makes its G-code"
+    )
     show(written_line((out,), contents))
     return 0
 

@@ -12,8 +12,9 @@ import numpy as np
 from machine.firmware import dialect_of
 from machine.firmware.klipper import stepper_name
 from machine.gcode.blocks import fill_block, resume_placeholders
-from machine.gcode.modes import ModalState
+from machine.gcode.modes import E_AXIS, ModalState, axes_of
 from machine.gcode.pen import Pen, number, turn
+from machine.gcode.words import read_letters, split_command
 from machine.kinematics.collision import Printed
 from machine.kinematics.table import axis_positions, followed_places
 from machine.link.pause.printed_bounds import PrintedBounds
@@ -207,8 +208,9 @@ def homed_return_moves(profile: Profile, printed: Printed, way: Turn, heat: Sequ
 
 def homes_z(machine: Machine) -> bool:
     """Whether machine.gcode.resume homes Z."""
-    homings = (line.split(";")[0].upper().split() for line in machine.gcode.resume.splitlines())
-    return any(words[:1] == ["G28"] and (len(words) == 1 or any("Z" in word for word in words[1:])) for words in homings)
+    commands = (split_command(line.split(";")[0].strip().upper()) for line in machine.gcode.resume.splitlines())
+    homed = [set(read_letters(rest)) & set(axes_of(machine).letters[:E_AXIS]) for name, rest in commands if name == "G28"]
+    return any(not letters or "Z" in letters for letters in homed)
 
 
 def _clear_z_mm(profile: Profile, printed: Printed, pose: Pose) -> float:

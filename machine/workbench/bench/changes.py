@@ -28,6 +28,7 @@ from profiles.messages import option
 from profiles.part_settings import MOST_PARTS
 from profiles.profile import Profile
 
+SAME_NORMAL = 1e-9
 TURN_DIGITS = 15  # makes quarter turns exact
 MOST_STOPS = 1000
 Cuts = tuple[PlannedPart, ...]
@@ -177,8 +178,10 @@ def add(bench: Bench, *, normal: Direction, offset_mm: Mm, after: int | None = N
 
 def move(bench: Bench, *, part: int, normal: Direction, offset_mm: Mm, near: bool = False) -> Edit:
     """Replace the plane of a part; its limbs stay."""
-    plane = PlannedPart(normal, offset_mm, limbs_mm=planned_part(bench, part).limbs_mm)
-    return Edit("move a plane", [(_replaced(bench, part, plane), part)], near)
+    before = planned_part(bench, part)
+    plane = PlannedPart(normal, offset_mm, limbs_mm=before.limbs_mm)
+    tilts = before.normal is not None and float(np.abs(np.subtract(before.normal, normal)).max()) > SAME_NORMAL
+    return Edit("tilt a plane" if tilts else "move a plane", [(_replaced(bench, part, plane), part)], near)
 
 
 def snap(bench: Bench, part: int, neck: PlannedPart) -> Edit:

@@ -29,6 +29,7 @@ OPTIONS = {
 }
 PHRASES = {
     "again": "try again",
+    "calibration": "(the command tiltprint calibrate measures them)",
     "another baud rate": "try another baud rate",
     "another plate": "choose another one below",
     "compiling": "getting ready (first run only)",
@@ -45,7 +46,7 @@ PHRASES = {
     "offset": "the offset is {} mm",
     "protected": "protected area {}",
     "page": "{}",
-    "one part": "choose 1 part",
+    "one part": "choose 1 part under Parts",
     "settings": "Settings",
     "": "",
 }

@@ -87,7 +87,8 @@ def set_value(session: Session, *, key: str, value: str | None = None) -> Work:
     if "=" in key or key.partition(".")[0] not in SECTIONS:
         raise ProfileError(f"{key!r} is not a key of a profile")
     before = session.bench.profile
-    return session.take_given(f"set {key_name(key)}", lambda given: with_typed(given, key, value, before), key)
+    word = "scale all models on the plate" if key == "process.scale" and session.bench.beside else f"set {key_name(key)}"
+    return session.take_given(word, lambda given: with_typed(given, key, value, before), key)
 
 
 def reset(session: Session, *, kind: ProfileKind | None = None) -> Work:
@@ -97,8 +98,8 @@ def reset(session: Session, *, kind: ProfileKind | None = None) -> Work:
 
 
 def slice_parts(session: Session) -> None:
-    """Slice the model, unless planes on the bench cannot be cut."""
-    if sentence := session.trials.unsliceable():
+    """Slice the model, unless it is known that it cannot be."""
+    if sentence := session.unsliceable():
         raise PlanError(sentence)
     session.slicing.slice()
 

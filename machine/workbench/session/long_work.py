@@ -63,7 +63,9 @@ class Finding(Derived[Found]):
         now = self._session.bench
         laid = now if found.turn is None else with_rotation(now, (found.turn @ np.array(now.rotation)).tolist())
         self.laid = None if laid is now else (now.rotation, laid.rotation)
-        self._session.do("find parts", with_front(laid, found.front, found.notes))
+        after, is_found = with_front(laid, found.front, found.notes), any(planned_parts(row) == now.cuts for row in now.rows)
+        own = [] if is_found else [cut for cut in now.cuts or () if cut not in now.locked]
+        self._session.do("find parts", after, "your planes were replaced: Undo brings them back" if own else "")
 
 
 def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:

@@ -1,5 +1,6 @@
 """Planes on a bench: preparation as soon as there is a model, trials while the user drags them, and their application."""
 
+import asyncio
 from collections import deque
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from machine.workbench.bench.values import Asked, vector_of
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.work.cutting import load_kernels, make_ready, near_neck, nearest, support_uncut, try_cuts
 from machine.workbench.work.models import Resting, Standing, mark, rank_resting, stand
+from machine.workbench.work.plate import Plated, put_on_plate
 from mdp.read import MANY_FACES
 from mdp.search.neck import REACH_DEG, REACH_SHARE
 from mdp.search.plan_file import PlannedPart
@@ -81,26 +83,39 @@ def standing_of(session: SessionBase) -> Derived[Standing]:
     """The placement of the model on the bench."""
 
     async def find(bench: Bench) -> Standing:
-        drawn = session.new_file()
-        standing = await session.hand.run(stand, bench, session.others, drawn)
-        finalize(standing, drawn.unlink, missing_ok=True)
+        standing = await session.hand.run(stand, bench)
         if standing.refusal:
             session.refuse(MeshError(standing.refusal))
         return standing
 
-    return Derived(session, lambda bench: _stands_by(session, bench), find)
+    return Derived(session, _stands_by, find)
 
 
-def _stands_by(session: SessionBase, bench: Bench) -> tuple[object, ...] | None:
+def _stands_by(bench: Bench) -> tuple[object, ...] | None:
     """Everything that determines the placement and its report; None without a model."""
     if bench.model is None:
         return None
     process = bench.profile.of_part(1).process
     decides = process.self_supporting_angle_deg, process.line_width_mm, process.place_mm, bench.profile.machine
-    several = bench.copies > 1 or bool(bench.beside)
-    plate = (bench.copies, bench.beside, bench.cuts, bench.zones, bench.profile) if several else ()
-    others = session.others_version if bench.beside else 0
-    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides, plate, others
+    return bench.model, bench.rotation, bench.profile.search.pedestal_mm, *decides
+
+
+def plated_of(session: SessionBase) -> Derived[Plated]:
+    """The places of all models on the plate, which take seconds where they are cut; nothing else waits for them."""
+
+    def decides(bench: Bench) -> tuple[object, ...] | None:
+        if bench.model is None or (bench.copies == 1 and not bench.beside):
+            return None
+        return *bench.shaped, bench.copies, bench.beside, session.others_version if bench.beside else 0
+
+    async def find(bench: Bench) -> Plated:
+        await asyncio.sleep(REST_S)
+        drawn = session.new_file()
+        plated = await session.aside.run(put_on_plate, bench, session.others, drawn)
+        finalize(plated, drawn.unlink, missing_ok=True)
+        return plated
+
+    return Derived(session, decides, find, interrupts=True)
 
 
 def pedestal_key(bench: Bench, standing: Standing | None) -> str:
@@ -238,6 +253,8 @@ class PlaneTrials:
     def unsliceable(self) -> str:
         """Sentence on why planes on the bench keep it from being sliced; "" if they do not."""
         words, count = invalid_in_words(self._session.bench, self.invalid), len(self.invalid)
+        if words.endswith("cannot cut this model"):  # at no tilt
+            return f"{words}: remove its plane, or choose another machine under Settings"
         return words and f"{words}: move or remove {'its plane' if count == 1 else 'their planes'}, or find parts again"
 
     def _wanted(self, bench: Bench) -> Cuts | None:

@@ -34,7 +34,7 @@ from machine.workbench.bench.values import with_value
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.session.keeping import Keeping
 from machine.workbench.session.long_work import Comparing, Finding, Slicing, price_by_hand, prices_of
-from machine.workbench.session.planes import PlaneTrials, Readiness, invalid_in_words, resting_of, standing_of
+from machine.workbench.session.planes import PlaneTrials, Readiness, invalid_in_words, plated_of, resting_of, standing_of
 from machine.workbench.work.cutting import draw_pieces, measure_plan
 from machine.workbench.work.folders import files_in, new_folder
 from machine.workbench.work.models import Unscaled, read_model
@@ -74,6 +74,7 @@ class Session(SessionBase):
         super().__init__(Bench(profile, given=given), pools)
         self.slicing, self.readiness = Slicing(self), Readiness(self)
         self.standing, self.resting = standing_of(self), resting_of(self, self.readiness)
+        self.plated = plated_of(self)
         self.trials = PlaneTrials(self, self.readiness)
         self.finding, self._prices, self.by_hand = Finding(self), prices_of(self), price_by_hand(self)
         self.comparing = Comparing(self, self.slicing)
@@ -108,6 +109,12 @@ class Session(SessionBase):
             return f"the work on a bench could not be kept: {trouble}" if trouble else ""
         self.received.leave()
         return f"the work on a bench could not be kept: {trouble}; the files of its pages stay in {self.received.path} for a day"
+
+    def unsliceable(self) -> str:
+        """Why what is on the bench cannot be sliced, as far as it is known; "" if it can."""
+        bench, standing, plated = self.bench, self.standing.result, self.plated.result
+        known = self.trials.unsliceable() or (plated.problem if plated is not None and plated.is_sure else "")
+        return known or ("" if bench.cuts or standing is None else standing.problem)
 
     def warm(self) -> None:
         """Load heavy modules in the worker processes ahead of use."""

@@ -254,7 +254,7 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("model/{key}", _of_key(_model_key, _model)),
         route("marks/{key}", _of_key(lambda session: marks_key(session.bench), _marks)),
         route("pedestal/{key}", _of_key(lambda session: pedestal_key(session.bench, session.standing.result), _pedestal)),
-        route("others/{key}", _of_key(lambda session: getattr(session.standing.result, "others_key", ""), _others)),
+        route("others/{key}", _of_key(lambda session: getattr(session.plated.result, "others_key", ""), _others)),
         route("facets/{key}", _of_key(_model_key, _facets)),
         route("file", uploads.take, "POST"),
         route("left", uploads.list_left),
@@ -344,10 +344,10 @@ async def _pedestal(session: Session, request: Request) -> Response:
 
 
 async def _others(session: Session, request: Request) -> Response:
-    standing = session.standing.result  # its file exists as long as it
-    assert standing is not None
-    assert standing.others is not None
-    return Response(await asyncio.to_thread(standing.others.read_bytes), media_type=BYTES)
+    plated = session.plated.result  # its file exists as long as it
+    assert plated is not None
+    assert plated.others is not None
+    return Response(await asyncio.to_thread(plated.others.read_bytes), media_type=BYTES)
 
 
 async def _facets(session: Session, request: Request) -> Response:

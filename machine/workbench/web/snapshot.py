@@ -23,6 +23,7 @@ from machine.workbench.session.commands import Need, lacking
 from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session
 from machine.workbench.work.models import Resting
+from machine.workbench.work.plate import Plated
 from mdp.joint import Joint
 from mdp.overhang import PLATE_TOLERANCE_MM, threshold
 from mdp.save import plane_values
@@ -167,7 +168,7 @@ def snapshot(session: Session) -> dict[str, Any]:
         "busy": session.busy,
         "note": session.note,
         "preparing": bool(session.readiness.progress),
-        "unsliceable": _unsliceable(session),
+        "unsliceable": session.unsliceable(),
         "lacking": {need: lacking(session, need) for need in Need if need != Need.NOTHING},
         "savable": _savable(session),
         **_steps(session.history),
@@ -184,14 +185,6 @@ def snapshot(session: Session) -> dict[str, Any]:
         "benches": session.benches,
         "kept": session.keeping.released,
     }
-
-
-def _unsliceable(session: Session) -> str:
-    """Why what is on the bench cannot be sliced, as far as it is known; "" if it can."""
-    bench, standing = session.bench, session.standing.result
-    if (invalid := session.trials.unsliceable()) or standing is None:
-        return invalid
-    return standing.copies_problem or ("" if bench.cuts else standing.problem)
 
 
 def _steps(history: History) -> dict[str, Any]:
@@ -245,17 +238,28 @@ def _parts_state(session: Session) -> dict[str, Any]:
 
 def _plate_state(session: Session) -> dict[str, Any]:
     """All models on the plate, where they stand, and the pauses of their print."""
-    bench, standing = session.bench, session.standing.result
+    bench, plated = session.bench, session.plated.result
     count = bench.copies + sum(copies for _, copies in bench.beside)
-    told = "" if standing is None or count == 1 else standing.copies_problem or f"All {count} stand on the plate."
+    if count == 1:
+        plated, told = Plated(), ""
+    elif plated is None:
+        told = f"Looking for places for all {count} on the plate …"
+    else:
+        told = (
+            f"{plated.problem}. Until then they are drawn in red beside the plate."
+            if plated.problem
+            else f"All {count} stand on the plate."
+        )
     return {
         "place_mm": bench.profile.process.place_mm,
         "copies": bench.copies,
-        "copies_mm": standing and [[round(x, 3), round(y, 3)] for x, y in standing.copies_mm],
+        "copies_mm": plated and [[round(x, 3), round(y, 3)] for x, y in plated.copies_mm],
         "copies_told": told,
+        "misplaced": plated is not None and plated.problem != "",
+        "is_sure": plated is None or plated.is_sure,
         "plate_told": _extent(bench.profile.machine.table),
-        "beside": [{"name": other.name, "copies": copies} for other, copies in bench.beside],
-        "others": standing and standing.others_key,
+        "beside": [{"name": other.name, "copies": copies, "size_mm": other.size_mm} for other, copies in bench.beside],
+        "others": plated and plated.others_key,
         "addable": session.addable,
         "stops": [_stop(stop) for stop in bench.stops],
     }

@@ -117,7 +117,7 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
 
     untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
     if orient and untouched and lies_freely(profile):
-        tell(Searched(f"weighing the ways in which {len(mesh.faces):,} faces may lie"))
+        tell(Searched(f"comparing orientations of the model ({len(mesh.faces):,} faces)"))
         oriented = orient_and_decompose(mesh, profile, pricing, search)
         turn = None if oriented.orientation is None else oriented.orientation.rotation
         decomposition = oriented.decomposition

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,13 +10,11 @@ import numpy as np
 from machine.pipeline import compilers
 from machine.pipeline.embedded_profile import has_settings
 from machine.pipeline.project import STANDING
-from machine.planning.fit import Place
 from machine.workbench.bench.bench import Bench
 from machine.workbench.bench.changes import workpiece_mesh
 from machine.workbench.bench.model import Model, mesh_blocks
 from machine.workbench.bench.values import vector_of
 from machine.workbench.work.cutting import out_of_reach, turned_mesh
-from machine.workbench.work.plate import places_on_plate
 from mdp.directions.orientation import in_words, resting_facets, side_in_words
 from mdp.kernels.workers import Tell
 from mdp.overhang import Mask, risky_upright
@@ -27,10 +25,9 @@ from mdp.search.orient import distinct_orientations
 from mdp.search.parts import one_piece
 from mdp.search.plan_file import ZONE_KINDS
 from mdp.zone import Zone, Zones
-from profiles.errors import MeshError, PlanError
+from profiles.errors import MeshError
 from profiles.frozen import Vector
 from profiles.profile import Profile
-from profiles.settings.support import MIDDLE
 
 FACET_DIGITS = 4  # digits after the point of mm
 
@@ -120,24 +117,17 @@ def named_faces(bench: Bench) -> Mask:
 class Standing:
     """Placement of a model. size_mm: along the plate's axes, without the pedestal; overhang_mm2: area that overhangs too far, off
     the plate; problem: why the machine cannot reach it in one piece, in the words of `export`, "" if it can; pedestal: in the
-    format of `mesh_blocks`, b"": there is none; refusal: why a wanted pedestal is impossible; copies_mm: x, y of the copies'
-    centres relative to its place, the nearest first, (0, 0) alone if they do not fit; copies_problem: why all models of the plate
-    do not fit, "": they do; others, others_key: file of the other models' triangles, in the format of `mesh_blocks`, from its
-    place, and their key, "" if there are none."""
+    format of `mesh_blocks`, b"": there is none; refusal: why a wanted pedestal is impossible."""
 
     size_mm: Vector
     overhang_mm2: float
     problem: str
     pedestal: bytes = b""
     refusal: str = ""
-    copies_mm: tuple[Place, ...] = (MIDDLE,)
-    copies_problem: str = ""
-    others: Path | None = None
-    others_key: str = ""
 
 
-def stand(tell: Tell, bench: Bench, others: Path, drawn: Path) -> Standing:
-    """The placement of the model on the bench. others: the file of the other models' parts; drawn: that of their triangles."""
+def stand(tell: Tell, bench: Bench) -> Standing:
+    """The placement of the model on the bench."""
     mesh, profile, pedestal, refusal = turned_mesh(bench), bench.profile, b"", ""
     size_mm = vector_of(np.ptp(mesh.bounds_mm, axis=0))
     height_mm = profile.search.pedestal_mm
@@ -149,11 +139,4 @@ def stand(tell: Tell, bench: Bench, others: Path, drawn: Path) -> Standing:
             pedestal, refusal = b"", f"{error}"
     risky = risky_upright(mesh, profile.process.self_supporting_angle_deg)
     problem = out_of_reach((one_piece(mesh, profile.machine),), profile)
-    standing = Standing(size_mm, float(mesh.areas_mm2[risky].sum()), problem, pedestal, refusal)
-    if bench.copies == 1 and not bench.beside:
-        return standing
-    try:
-        copies_mm, key = places_on_plate(mesh, bench, others, drawn)
-    except (MeshError, PlanError) as error:
-        return replace(standing, copies_problem=f"{error}")
-    return replace(standing, copies_mm=copies_mm, others=drawn, others_key=key)
+    return Standing(size_mm, float(mesh.areas_mm2[risky].sum()), problem, pedestal, refusal)

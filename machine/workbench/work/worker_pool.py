@@ -21,7 +21,7 @@ from profiles.errors import CutError, UserError
 CLOSED = "this bench is closed: nothing is worked out for it any more"
 REST_AFTER_S = 300.0  # idle time after which a process ends: each holds some 200 MB
 Value = TypeVar("Value")
-TASKS = "cutting", "models", "slices"  # modules of this room with tasks
+TASKS = "cutting", "models", "plate", "slices"  # modules of this room with tasks
 
 
 async def heard(values: Iterator[Value]) -> AsyncGenerator[Value, None]:

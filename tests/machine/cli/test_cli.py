@@ -112,6 +112,7 @@ WRONG = [
     (["decompose", "demo:tree", "demo:box"], "unexpected argument demo:box; see tiltprint decompose --help"),
     (["fly"], "decompose"),
     (["exprot"], "did you mean export?"),
+    (["slice", "model.stl"], "command slice is not known (did you mean export?)"),
     (["print", "demo:tree", "--port", "/dev/nowhere"], "/dev/nowhere does not exist"),
     (["print", "demo:tree", "--port", "/dev/null"], "/dev/null"),
     (["print", "demo:tree", "--port", "sim", "--sim-speed", "-1"], "--sim-speed is -1"),

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.dryrun import dry_run
-from machine.kinematics.collision import hull, refined_gap, sweep_gaps, table_reach
+from machine.kinematics.collision import hull, refined_gap, sweep_gaps, swing_mm, table_reach
 from machine.kinematics.table import machine_points
 from mdp.directions.unit_vectors import spread
 from mdp.head import Block, Ring, bodies, directions
@@ -157,3 +157,13 @@ def test_the_head_is_checked_against_a_clip_where_the_plate_has_turned_it(turn: 
     ]
     found = [finding.message for finding in dry_run(lines, profile).findings if finding.code == "collision"]
     assert [message.split(" at ")[0] for message in found] == ["hot end runs into the plate's clip"] * is_met
+
+
+def test_the_bound_of_how_far_a_turn_swings_covers_a_clip() -> None:
+    clip = TableBox(name="clip", min_mm=(60.0, -5.0, 0.0), max_mm=(80.0, 5.0, 90.0))
+    table = GENERIC.machine.table.model_copy(update={"clips": [clip]})
+    machine = GENERIC.machine.model_copy(update={"table": table, "cradle": []})
+    top = machine_points(machine, Pose(0.0, 0.0), np.array([[80.0, 5.0, 90.0]]))[0]
+    from_axis = top - np.array(machine.tilt.point_mm)
+    assert swing_mm(machine, hull(np.zeros((0, 3)), 0.0)) >= np.hypot(from_axis[1], from_axis[2])
+    assert swing_mm(machine, hull(np.zeros((0, 3)), 0.0)) >= np.linalg.norm([80.0, 5.0, 90.0])

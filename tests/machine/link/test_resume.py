@@ -263,8 +263,27 @@ def test_after_a_power_cut_the_axis_keeps_the_z_offset_which_marlin_does_not_set
     assert heights_of_strokes(printer) == {63.1, 63.3}
 
 
+def test_after_such_a_restart_a_further_z_offset_is_refused_as_marlin_would_ignore_it(text: GcodeFile) -> None:
+    printer, control, messages = VirtualPrinter(PROFILE.machine), Control(), list[str]()
+    story = shifted_then_killed(text, printer)
+    printer.firmware.reset()
+
+    def watch(status: PrintStatus) -> None:
+        messages.append(status.message)
+        if len(messages) == 60:
+            control.ask(Command.BABYSTEP, 0.05)
+
+    print_lines(
+        text, PATH, medium=printer.medium, profile=PROFILE, control=control, on_progress=watch,
+        begin=lambda seen: plan_resume(cut_off(text, story.last), seen, PROFILE),
+    )  # fmt: skip
+    assert "no Z offset: this firmware cannot shift Z now (Marlin needs BABYSTEPPING, and Z homed since it started)" in messages
+    assert heights_of_strokes(printer) == {63.1, 63.3}
+
+
 @pytest.mark.parametrize(("block", "homes"), [
     ("", False), ("G28 X Y", False), ("; G28 Z", False), ("G28 Z F100\nG28 X Y", True), ("g28", True), ("G28 XZ ; all", True),
+    ("G28 O", True), ("G28 R5", True), ("G28XYZ", True), ("G28 X0 Y0", False),
 ])  # fmt: skip
 def test_a_resume_block_homes_z_by_g28_alone_or_with_that_letter(block: str, homes: bool) -> None:
     gcode = PROFILE.machine.gcode.model_copy(update={"resume": block})

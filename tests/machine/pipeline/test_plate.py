@@ -78,10 +78,40 @@ def test_copies_stand_where_the_head_that_prints_them_stays_clear_of_a_clip() ->
     clip = TableBox(name="clip", min_mm=(-20.0, -90.0, 0.0), max_mm=(20.0, -30.0, 12.0))
     clipped = machine.model_copy(update={"table": machine.table.model_copy(update={"clips": [clip]})})
     free, kept = (places_on_plate((20.0, 20.0), 5.0, 1000, of) for of in (machine, clipped))
-    near = shapely.box(-20.0, -90.0, 20.0, -30.0).buffer(8.0 + machine.clearance_mm, join_style="mitre")  # 20 mm lie at 30 mm
+    # the head is 8 mm wide at 5 mm and 20 mm at 30 mm: 11.84 mm at 1 mm above the clip
+    near = shapely.box(-20.0, -90.0, 20.0, -30.0).buffer(11.84 + machine.clearance_mm, join_style="mitre")
     assert any(near.intersects(shapely.box(x - 10, y - 10, x + 10, y + 10)) for x, y in free)
     assert not any(near.buffer(-1e-6).intersects(shapely.box(x - 10, y - 10, x + 10, y + 10)) for x, y in kept)
     assert len(kept) > 0.6 * len(free)
+
+
+def clipped(*corners_mm: tuple[float, float, float]) -> Profile:
+    """A profile whose plate has a clip between two corners."""
+    profile, clip = plate("process.support=none"), TableBox(name="clip", min_mm=corners_mm[0], max_mm=corners_mm[1])
+    table = profile.machine.table.model_copy(update={"clips": [clip]})
+    return profile.model_copy(update={"machine": profile.machine.model_copy(update={"table": table})})
+
+
+def test_copies_around_a_clip_are_printed_without_a_collision_on_the_ways_between_them() -> None:
+    profile = clipped((-3.0, -3.0, 0.0), (3.0, 3.0, 10.0))
+    model = decomposed(whole(box(16, 16, 1.8)))
+    decomposition, profile = in_copies(model, 6, profile)
+    program = build(decomposition, profile)
+    assert [finding.message for finding in program.run.errors] == []
+    travels = program.run.program.end[:, 2][program.run.program.end[:, 2] > 11.0]
+    assert len(travels) > 0  # it rises to cross the clip
+
+
+def test_models_of_several_sizes_stand_clear_of_a_clip() -> None:
+    profile = clipped((-20.0, -20.0, 0.0), (20.0, 20.0, 10.0))
+    models = [decomposed(whole(box(side, side, 4)), name=f"{side:g}") for side in (30.0, 16.0, 12.0)]
+    decomposition, profile = on_one_plate(models, profile)
+    clip = shapely.box(-20.0, -20.0, 20.0, 20.0)
+    (mesh,) = {part.mesh for part in decomposition.parts}
+    of_vertex = vertex_components(len(mesh.vertices), mesh.faces)
+    footprints = [shapely.MultiPoint(mesh.vertices[of_vertex == k, :2]).envelope for k in np.unique(of_vertex)]
+    assert sorted(round(footprint.area) for footprint in footprints) == [144, 256, 900]
+    assert min(clip.distance(footprint) for footprint in footprints) > 5.0
 
 
 def test_every_copy_has_the_settings_of_its_modifiers() -> None:
@@ -299,7 +329,18 @@ def test_models_that_the_head_cannot_pass_are_refused_with_what_goes() -> None:
     with pytest.raises(PlanError) as refused:
         on_one_plate(models, plate("process.complete_objects=true"))
     assert "that the head reaches without hitting them" in str(refused.value)
-    assert str(refused.value).endswith("process.complete_objects = false prints them layer by layer")
+    wanted = "process.complete_objects = false prints them layer by layer; or print fewer copies, or set a smaller process.scale"
+    assert str(refused.value).endswith(wanted)
+
+
+def test_models_that_would_fit_but_for_the_head_are_refused_with_that_cause_even_where_no_free_place_is_left() -> None:
+    models = [decomposed(whole(box(60 + k, 60, 70 + k)), name=f"box {k}") for k in range(3)]
+    on_one_plate(models, plate())  # layer by layer there is room for all
+    with pytest.raises(PlanError) as refused:
+        on_one_plate(models, plate("process.complete_objects=true"))
+    place, _, cause = str(refused.value).partition(" that the head reaches without hitting them: ")
+    assert place.endswith("has no place for it beside another one")
+    assert cause.startswith("models are printed one after another")
 
 
 def test_a_model_without_room_is_named_with_the_room_that_it_needs() -> None:

@@ -25,6 +25,7 @@ from machine.workbench.web.snapshot import snapshot
 from machine.workbench.work import models as work
 from machine.workbench.work.cutting import cut_bench, make_folder
 from machine.workbench.work.models import Standing, read_model, stand
+from machine.workbench.work.plate import Plated, put_on_plate
 from machine.workbench.work.worker_pool import WorkerPools
 from mdp.mesh import Mesh
 from mdp.pose import turned_by
@@ -190,13 +191,13 @@ def test_what_a_slicer_file_marks_lies_on_the_bench_boxes_and_other_shapes_too(t
 def standing(mesh: Mesh, turns_deg: tuple[float, float, float] = (0.0, 0.0, 0.0), **settings: Any) -> Standing:
     profile = load(settings=[f"{key.replace('__', '.')}={value}" for key, value in settings.items()])
     bench = replace(with_model(Bench(profile), model(mesh=mesh)), rotation=turned_by(turns_deg).tolist())
-    return placed(bench)
+    return stand(lambda report: None, bench)
 
 
-def placed(bench: Bench) -> Standing:
-    """The placement of what is on a bench, with its files in a folder that is gone then."""
+def plated(bench: Bench) -> Plated:
+    """The plate of a bench, with its files in a folder that is gone then."""
     with TemporaryDirectory() as folder:
-        return stand(lambda report: None, bench, Path(folder) / "others", Path(folder) / "drawn")
+        return put_on_plate(lambda report: None, bench, Path(folder) / "others", Path(folder) / "drawn")
 
 
 # A tee is 10 mm thick: its bar of 40 mm hangs over its stem by 15 mm at each side, and seen along its thickness it has 700 mm2.
@@ -223,14 +224,15 @@ def test_what_is_larger_than_the_machine_reaches_is_told_in_the_sentence_of_expo
 
 def test_copies_stand_beside_the_model_in_parts_too_and_what_has_no_room_is_told_in_the_sentence_of_export() -> None:
     bench = replace(with_model(Bench(load(settings=["process.place_mm=[10, 5]"])), model(mesh=tee())), copies=3)
-    stood = placed(bench)
-    assert (len(stood.copies_mm), stood.copies_mm[0], stood.copies_problem) == (3, (0.0, 0.0), "")
-    crowd = placed(replace(bench, copies=500))
-    assert crowd.copies_mm == ((0.0, 0.0),)
-    assert crowd.copies_problem.startswith("500 copies: ")
+    stood = plated(bench)
+    assert (len(stood.copies_mm), stood.copies_mm[0], stood.problem) == (3, (0.0, 0.0), "")
+    crowd = plated(replace(bench, copies=500))
+    assert crowd.problem.startswith("500 copies: ")
+    assert (len(crowd.copies_mm), crowd.copies_mm[0]) == (500, (0.0, 0.0))
+    assert min(x for x, _ in crowd.copies_mm[1:]) + 10.0 > bench.profile.machine.table.radius_mm + 20.0  # beside the plate
     cut = replace(bench, cuts=(PlannedPart((0.0, 0.0, 1.0), 20.0),))
-    apart = placed(cut)
-    assert (len(apart.copies_mm), apart.copies_problem) == (3, "")
+    apart = plated(cut)
+    assert (len(apart.copies_mm), apart.problem) == (3, "")
 
 
 def test_on_a_pedestal_the_feet_stand_and_its_triangles_are_those_of_a_body_of_its_height() -> None:

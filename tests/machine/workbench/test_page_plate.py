@@ -6,7 +6,7 @@ from tests.machine.fake_page import needs_node, on_fake_page
 
 @needs_node
 def test_a_file_that_is_on_the_plate_twice_has_two_rows() -> None:
-    same = '{ name: "tee.stl", copies: 1 }'
+    same = '{ name: "tee.stl", copies: 1, size_mm: [40, 10, 40] }'
     act = f"""
         modules["model/benches"].platePanel();
         modules["page/store"].update({{ state: {{ addable: "", model: {same}, copies: 1, beside: [{same}], problem: "" }} }});

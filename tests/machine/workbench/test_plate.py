@@ -136,11 +136,24 @@ def test_a_model_opened_over_another_one_can_be_put_beside_it_instead(bench: Run
         page.do("add_opened")
         assert page.until(lambda state: state["problem"])["problem"].startswith("no model has just been opened over another")
         page.do("set", key="process.scale", value="2")
-        page.until(lambda state: state["scale"] == 2.0 and on_plate(state) == [("box.stl", 1)])
+        state = page.until(lambda state: state["scale"] == 2.0 and on_plate(state) == [("box.stl", 1)] and state["standing"])
+        assert (state["undo"], state["beside"][0]["size_mm"]) == ("scale all models on the plate", [16.0, 16.0, 4.0])
         page.do("beside", number=1, count=900)
         told = page.until(lambda state: state["copies_told"].startswith("box.stl measures 16.0 x 16.0 mm"))["copies_told"]
         assert "no room for it" in told
-        assert page.state["unsliceable"] == told  # the page shows it beside the button that slices, on every tab
+        assert told.endswith(". Until then they are drawn in red beside the plate.")
+        assert (page.state["unsliceable"], page.state["is_sure"]) == (
+            "",
+            False,
+        )  # the boxes are laid down first, which may make room
+        assert (page.state["misplaced"], len(page.state["copies_mm"])) == (True, 1)
+        assert drawn(bench, page.state)[0] == 900 * 12
+        page.do("slice")
+        sure = page.until(lambda state: state["unsliceable"])
+        assert sure["unsliceable"].startswith("box.stl measures 16.0 x 16.0 mm")
+        page.until(lambda state: not state["slicing"])
+        page.do("slice")  # refused at once
+        page.until(lambda state: state["problem"] == sure["unsliceable"] and not state["slicing"])
         page.do("undo")
         page.until(lambda state: state["copies_told"] == "All 2 stand on the plate.")
 

@@ -447,6 +447,10 @@ def test_figures_and_the_list_of_orientations_follow_what_a_hand_does(bench: Run
         assert page.state["by_hand"] is None
         (plane,) = page.state["cuts"]
         page.do("move", part=2, normal=plane["normal"], offset_mm=plane["offset_mm"] - 5.0)
+        leans = [plane["normal"][0] + 0.1, *plane["normal"][1:]]
+        page.do("move", part=2, normal=leans, offset_mm=plane["offset_mm"], near=True)
+        page.until(lambda state: state["undo"] == "tilt a plane")
+        page.do("undo")
         moved = page.until(lambda state: state["undo"] == "move a plane")
         assert moved["by_hand"] is None  # not known yet, rather than that of the planes before
         by_hand = page.until(lambda state: state["by_hand"])["by_hand"]

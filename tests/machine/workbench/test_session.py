@@ -21,6 +21,7 @@ from machine.workbench.session.session import Session, Workbench
 from machine.workbench.web.snapshot import snapshot
 from machine.workbench.work.cutting import Found, Searched
 from machine.workbench.work.models import Standing
+from machine.workbench.work.plate import Plated
 from machine.workbench.work.worker_pool import TaskQueue, WorkerPools
 from mdp.decomposition import FrontRow
 from mdp.plane import Plane
@@ -512,6 +513,27 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
     ]
 
 
+def test_a_search_that_replaces_planes_made_by_hand_says_so_and_how_to_have_them_back() -> None:
+    found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
+    notes: list[str] = []
+
+    async def work(session: Session) -> None:
+        async def find(task: Any, *given: Any, **more: Any) -> Any:
+            return Found((found,), ())
+
+        session.long.run = find  # type: ignore[method-assign]
+        session.do("add", with_cuts(session.bench, (PlannedPart(UP, 9.0),)))
+        for _ in range(2):
+            obey(session, {"do": "search"})
+            await session.finding.wait()
+            await asyncio.sleep(0)
+            await session.finding.wait()
+            notes.append(session.note)
+
+    when_done(work)
+    assert notes == ["your planes were replaced: Undo brings them back", ""]
+
+
 def test_a_search_that_begins_in_the_instant_in_which_another_is_stopped_goes_on() -> None:
     found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
 
@@ -696,22 +718,48 @@ def test_the_other_models_stay_in_the_picture_while_a_task_cuts_them_and_are_pla
         async def cut(task: Any, bench: Bench, others: Path, *given: Any, **more: Any) -> Any:
             others.write_bytes(b"the parts of the other models")
             session.notify()
-            stood.append(session.standing.result is not None)
+            stood.append(session.plated.result is not None)
             await asyncio.sleep(0)
             return ()
 
+        async def put(task: Any, *given: Any) -> Plated:
+            return Plated()
+
         session.long.run = cut  # type: ignore[assignment, method-assign]
+        session.aside.run = put  # type: ignore[assignment, method-assign]
         session.do("add b", with_beside(session.bench, ((model("b"), 1),)))
-        await settled(session)
-        before = session.standing.number
+        await session.plated.wait()
+        before = session.plated.number
         obey(session, {"do": "slice"})
         await settled(session)
+        await session.plated.wait()
         obey(session, {"do": "compare"})
         await settled(session)
-        stood.append(session.standing.number == before + 2)
+        await session.plated.wait()
+        stood.append(session.plated.number == before + 2)
 
     when_done(work)
     assert stood == [True, True, True]
+
+
+def test_the_size_is_known_at_once_while_places_for_copies_of_cut_models_are_still_looked_for() -> None:
+    known: list[bool] = []
+
+    async def work(session: Session) -> None:
+        async def put(task: Any, *given: Any) -> Plated:
+            await asyncio.sleep(60.0)
+            return Plated()
+
+        session.aside.run = put  # type: ignore[assignment, method-assign]
+        session.do("copies", replace(session.bench, copies=2, cuts=(PlannedPart((0.0, 0.0, 1.0), 5.0),)))
+        await session.standing.wait()
+        state = snapshot(session)
+        known.append(state["standing"] is not None and state["copies_mm"] is None)
+        known.append(state["copies_told"] == "Looking for places for all 2 on the plate …")
+        session.plated.stop()
+
+    when_done(work)
+    assert known == [True, True]
 
 
 def test_a_trial_on_another_bench_does_not_have_the_present_one_prepared_again() -> None:

@@ -191,6 +191,11 @@ def test_the_body_of_the_head_that_would_meet_the_table_is_named() -> None:
     assert len(_cut(low, (LEANING, 8.0), profile=_profile(FREE)).parts) == 2
 
 
+def test_a_model_lower_than_the_head_needs_is_said_to_be_one_that_the_machine_cannot_cut_at_this_tilt() -> None:
+    sentence = _refusal(shapes.tee(height=14.0), (LEANING, 8.0), profile=_profile("machine.clearance_mm=20"))
+    assert sentence.endswith("mm above it, and the model is 14.0 mm high: generic A/C table cannot cut this model at this tilt")
+
+
 def test_the_axis_that_would_leave_its_limits_is_named() -> None:
     machine = load().machine
     narrow = machine.model_copy(update={"x": machine.x.model_copy(update={"limits_mm": (-5.0, 5.0)})})

@@ -1,4 +1,4 @@
-// Rows: the moves of the print from the page's data (docs/page-format.md), one row for each straight move, and what is computed from them at the start.
+// Rows: the moves of the print from the page's data (CONTRIBUTING.md has their format), one row for each straight move, and what is computed from them at the start.
 
 import { bounds, countUpTo, IDENTITY, length, mix, moved, multiply, RAD, rotated, sub, undone, unit } from "../picture/math.js";
 import { surfacesOf } from "../picture/shapes.js";

@@ -1,4 +1,4 @@
-// Lines: the text of the G-code out of the page's own rows: patterns whose holes the numbers of a line's move fill (docs/page-format.md).
+// Lines: the text of the G-code out of the page's own rows: patterns whose holes the numbers of a line's move fill (CONTRIBUTING.md has their format).
 
 import { $, listen, made, nextFrame, tell, toggle } from "../elements.js";
 import { clamp, countUpTo } from "../picture/math.js";

@@ -7,7 +7,7 @@
 import { made, notice } from "../../../view/template/elements.js";
 import { keptInTab } from "./store.js";
 
-export const AGAIN_MS = 1000;
+export const AGAIN_MS = 1000, SAVED_MS = 6000; // until a line is tried again, and as long as a saved file is told
 const SILENT_MS = 1500, LATE_MS = 200; // without a beat, two a second; and until what has come is heard, where the page itself was busy
 const ENDINGS = { 4404: "closed", 4403: "unpaired" }; // by the code with which the server ends a line: its bench is closed, its device let go
 const NOT_SENT = "the line to tiltprint is lost, so this was not done";
@@ -109,6 +109,8 @@ export async function save(address) {
   const name = decodeURIComponent(/filename\*=UTF-8''(\S+)/.exec(answer.headers.get("content-disposition"))[1]);
   const link = made("a", { href: URL.createObjectURL(await answer.blob()), download: name });
   link.click();
+  notice(`saved ${name}`, "saved");
+  setTimeout(notice, SAVED_MS, "", "saved");
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
 }
 

@@ -5,6 +5,7 @@ import pytest
 from machine.dryrun.dryrun import dry_run
 from machine.setup.calibration.program import calibration_lines, plan_touches
 from profiles.errors import MoveError
+from profiles.machine import TableBox
 from profiles.profile import load, shipped
 from tests.machine.setup.calibration.touches import machine_of
 
@@ -31,3 +32,11 @@ def test_the_tilts_are_the_steepest_to_both_sides_or_two_to_one(name: str, tilts
 def test_a_machine_with_three_axes_has_nothing_to_calibrate() -> None:
     with pytest.raises(MoveError, match="there is no rotary axis"):
         plan_touches(machine_of("three_axis"), 20.0)
+
+
+def test_the_table_turns_under_a_tip_that_is_over_its_clips_too() -> None:
+    machine = load().machine
+    clip = TableBox(name="clip", min_mm=(70.0, -5.0, 0.0), max_mm=(90.0, 5.0, 200.0))
+    clipped = machine.model_copy(update={"table": machine.table.model_copy(update={"clips": [clip]})})
+    assert plan_touches(clipped, 20.0).safe_z_mm > plan_touches(machine, 20.0).safe_z_mm
+    assert plan_touches(clipped, 20.0).safe_z_mm > 200.0

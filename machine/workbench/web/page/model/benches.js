@@ -44,14 +44,8 @@ function upload(file, how, to, sent, answered) {
     Object.assign($("sending-bar"), { value: loaded, max: total });
     tell({ "sending-told": `Sending ${file.name}: ${mb(loaded)} of ${mb(total)} MB` });
   };
-  request.upload.onloadend = () => { // the server reads it now, which its state tells
-    hide({ sending: true });
-    sent();
-  };
-  request.onloadend = () => {
-    sent();
-    answered();
-  };
+  request.upload.onloadend = () => { hide({ sending: true }); sent(); }; // the server reads it now, which its state tells
+  request.onloadend = () => { sent(); answered(); };
   $("sending-cancel").onclick = () => request.abort();
   request.open("POST", `${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE, ...how })}`);
   request.send(file);
@@ -65,15 +59,15 @@ export function platePanel() {
     $("add-file").value = "";
   } });
   onState(({ addable }) => sayIn("add-opened", addable && `Add ${addable} to the plate instead`));
-  onNew(({ model, copies, beside, problem }) => [model ? [{ name: model.name, copies }, ...beside] : [], problem], ([models, problem]) => putRows(
-    models.map(({ name, copies }, number) => ({ id: `${number} ${name}`, content: `${copies} ${problem}`, make: () => plateRow(name, copies, number) })), $("plate-list")));
+  onNew(({ model, standing, copies, beside, problem }) => [model ? [{ name: model.name, copies, size_mm: (standing || model).size_mm }, ...beside] : [], problem], ([models, problem]) => putRows(
+    models.map(({ name, copies, size_mm: size }, number) => ({ id: `${number} ${name}`, content: `${copies} ${size} ${problem}`, make: () => plateRow(name, copies, size, number) })), $("plate-list")));
 }
 
-function plateRow(name, copies, number) {
+function plateRow(name, copies, size, number) {
   const change = (count) => send(number ? { do: "beside", number, count } : { do: "copies", count });
   const onchange = ({ target }) => change(Math.max(1, Math.round(Number(target.value))));
   const field = made("input", { type: "number", min: 1, value: copies, ariaLabel: `Copies of ${name}`, onchange });
-  return made("li", {}, made("span", { text: name }), field, number ? removeButton(`Take ${name} off the plate`, () => change(0)) : "");
+  return made("li", {}, made("span", { text: name }, made("small", { text: `${size.map((x) => x.toFixed(1)).join(" × ")} mm` })), made("label", {}, "copies ", field), number ? removeButton(`Take ${name} off the plate`, () => change(0)) : "");
 }
 
 function benchRow({ number, name, parts, work }) {

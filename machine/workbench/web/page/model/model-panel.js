@@ -77,7 +77,8 @@ export function sizePanel() {
     const { standing } = store.state;
     if (standing) scale((store.state.scale * Number(side.value)) / standing.size_mm[k]);
   }));
-  onState(({ standing, scale: factor, machine, problem, place_mm: place }, before) => {
+  onState(({ standing, scale: factor, machine, problem, place_mm: place, beside }, before) => {
+    hide({ "scale-told": !beside.length });
     if (!standing) return;
     const anew = problem !== before?.problem || !alike(standing, shown);
     shown = standing;
@@ -110,10 +111,11 @@ export function placePanel(picture) {
   $("place-middle").addEventListener("click", () => putFar(MIDDLE));
   onState(({ plate_told: extent }) => tell({ "place-told": extent }));
   let told = "", copies = [[...MIDDLE, 0]]; // where they stand; the first is the one that hands turn, cut and mark
-  subscribe(() => {
+  subscribe(({ state }, before) => {
     const now = JSON.stringify(placeNow());
-    if (store.state.copies_mm) copies = store.state.copies_mm.map((place) => [...place, 0]); // none are known yet of a model that has just been turned
-    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])), [...placeNow(), 0]);
+    if (state.copies_mm) copies = state.copies_mm.map((place) => [...place, 0]); // none are known yet of a model that has just been turned
+    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])), [...placeNow(), 0], state.misplaced);
+    if (state.misplaced && !before.state?.misplaced) picture?.fit();
     if (now === told) return;
     told = now;
     fields.forEach((field, axis) => { field.value = placeNow()[axis]; });

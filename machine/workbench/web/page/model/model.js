@@ -59,9 +59,10 @@ export function modelOf(picture) {
 function look(picture, red) {
   const { state: { search, parts, colours }, tab, row, part } = store;
   const planes = row ? row.planes : search?.planes.length ? search.planes : parts ? planesNow() : null, cut = tab !== "model" && planes;
-  picture.cut(cut && !planes.some((plane) => plane.limbs_mm) ? planes : null, row || search ? colours : fadedColours(colours, part));
+  const limbs = cut && planes.some((plane) => plane.limbs_mm);
+  picture.cut(limbs ? null : cut, row || search ? colours : fadedColours(colours, part));
   picture.red(cut ? null : red);
-  const entries = cut ? swatches(colours.slice(0, planes.length + 1).map((colour, k) => [colour, `${k + 1}`])) : [];
+  const entries = cut && (!limbs || store.pieces) ? swatches(colours.slice(0, planes.length + 1).map((colour, k) => [colour, `${k + 1}`])) : [];
   $("legend").replaceChildren(...(entries.length ? [made("b", { text: "parts, in print order" }), ...entries] : []));
 }
 
@@ -71,6 +72,7 @@ export function bodiesOf(picture) {
     const take = (body, of) => {
       update({ [name]: body && { of, body } });
       document.documentElement.dataset[name] = body ? of : "";
+      if (store.state.misplaced) picture.fit();
     };
     const fetchBody = newest({ read: async (answer) => trianglesFrom(await answer.arrayBuffer()), take, insists: true });
     onState(({ [name]: key }) => { if (key !== null) fetchBody(key, `${name}/${key}`); }); // null: not known yet

@@ -77,10 +77,10 @@ export function pieceMet({ parts }, shifts, [from, along]) {
   return met.reduce((best, piece) => (piece.far < best.far ? piece : best), { part: 0, far: Infinity }).part;
 }
 
-const piecesSeen = () => store.pieces && store.tab === "parts" && !store.hand && !store.row && !store.state.search;
+const piecesSeen = () => store.pieces && store.tab !== "model" && !store.hand && !store.row && !store.state.search;
 
 /** By which share of the model's size the parts are drawn apart now. */
-export const apartNow = () => (piecesSeen() ? store.apart : 0);
+export const apartNow = () => (store.tab === "parts" && piecesSeen() ? store.apart : 0);
 
 export function apartPanel(picture) {
   const keyOf = ({ model, rotation, cuts, given, parts, invalid }) => (parts && model.drawn && !invalid.some(Boolean) ? JSON.stringify([model.key, rotation, cuts, given]) : "");
@@ -95,10 +95,10 @@ export function apartPanel(picture) {
     update({ apart: numberIn("apart"), clicks: "" }); // which are for the whole model
     picture.fit();
   } });
-  subscribe(({ state, tab, pieces, part, apart }, before) => {
+  subscribe(({ state, tab, pieces, part, apart }, before) => { // a limb's colour is seen on the piece alone
     Object.assign($("apart-line"), { hidden: !state.parts || !state.model.drawn }).control.value = apart;
-    if (tab === "parts" && !state.search && (state !== before.state || tab !== before.tab)) fetchPieces(keyOf(state), "pieces");
-    const seen = apartNow() || (piecesSeen() && state.cuts.some((plane) => plane.limbs_mm)); // a limb's colour is seen on the piece alone
-    picture?.pieces(seen ? pieces : null, pieces ? shiftsOf(pieces, apart) : [], part);
+    if (tab !== "model" && !state.search && (state !== before.state || tab !== before.tab)) fetchPieces(keyOf(state), "pieces");
+    const seen = apartNow() || (piecesSeen() && state.cuts.some((plane) => plane.limbs_mm));
+    picture?.pieces(seen ? pieces : null, pieces ? shiftsOf(pieces, apartNow()) : [], part);
   });
 }

@@ -185,24 +185,14 @@ export function handlesOf(picture) {
   });
 }
 
-const REFUSAL_MS = 6000; // for which it is told after the plane is let go
-let refusal = { part: 0, text: "", until: 0 }; // why a plane could not be moved, the last one
-
 /** Why a part's plane cannot be cut where it lies on the bench; "": it can. */
 export const invalidNow = (part = store.part) => store.state.invalid[part - 2] || "";
 
 /** The command that puts a refused plane, or the chosen one where it is invalid, at the nearest place where it can be cut; false: there is none. */
 const nearest = ({ part, state } = store, { normal, offset_mm } = planeNow() || {}) => state.refused?.near || (invalidNow() !== "" && !isLocked() && { do: "move", part, normal, offset_mm });
 
-/** Why the chosen plane cannot be where it is wanted, or could not a moment ago; "": it can. */
-function refusalNow({ hand, part, state: { refused, problem } }) {
-  if (hand?.why) {
-    clearTimeout(refusal.until);
-    const text = `Part ${hand.why.refused_part} cannot be cut off there: ${hand.why.refused}.`;
-    refusal = { part, text, until: setTimeout(() => { refusal.text = ""; update({}); }, REFUSAL_MS) };
-  } else if (hand || part !== refusal.part) refusal.text = "";
-  return refusal.text || (refused ? problem : "");
-}
+/** Why the chosen plane cannot be where it is wanted; "": it can, or is back where it can. */
+const refusalNow = ({ hand, state: { refused, problem } }) => (hand?.why ? `Part ${hand.why.refused_part} cannot be cut off there: ${hand.why.refused}.` : refused ? problem : "");
 
 /** The chosen part's plane: numbers, snaps, and what order it is printed in; new planes, and what becomes of those in a hand. */
 export function planesPanel(picture) {
@@ -242,7 +232,7 @@ function newPlane(picture) {
 }
 
 function tellAll() {
-  const { state: { locked, search, cuts, unsliceable }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store), invalid = invalidNow();
+  const { state: { locked, search, cuts, unsliceable, misplaced, is_sure: sure }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store), invalid = invalidNow();
   disable({ "find-others": Boolean(search) || !locked.some(Boolean) });
   hide({ plane: !plane, "put-near": !nearest(), "plane-tools": !plane || tab !== "parts" || Boolean(search) });
   if (plane) {
@@ -258,7 +248,7 @@ function tellAll() {
   $("plane-told").className = why ? "refused" : invalid && "invalid";
   const told = why ? why : invalid && !store.hand ? `Cannot be cut off here: ${invalid}.` : !figures || !cuts.length ? ""
     : `${mm2(figures.support_area_mm2)} to support, ${figures.seam_mm.toFixed(0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
-  tell({ "plane-told": told, "plane-name": `Part ${part}`, unsliceable: unsliceable && `Cannot be sliced: ${unsliceable}.` });
+  tell({ "plane-told": told, "plane-name": `Part ${part}`, unsliceable: unsliceable ? `Cannot be sliced: ${unsliceable}.` : misplaced && !sure ? "As they lie now, the models do not fit on the plate, as told under Model and Copies. To slice, the others are laid down and cut first, which may make room." : "" });
 }
 
 const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marked

@@ -39,6 +39,7 @@ export function printFrame(camera, picture) {
     toggle("looking", looking && tab !== "printing");
     pressed("look", looking === true);
     hide({ "print-page": !looking, "leave-print": !looking });
+    if (looking) $("scene").scrollIntoView({ block: "nearest" }); // on a phone it lies above what is read
     if (looking && there && ready) postView();
     if (!looking || there) return;
     [ready, finding] = [false, null];
@@ -144,10 +145,7 @@ const STOP_KEY = "e", HOLD_MS = 600, TWICE_MS = 1000;
 /** Hears the key of the emergency stop in a window: held down, which the button shows, or pressed twice, for a single press may be a slip. */
 function stopKey(stop) {
   let timer = 0, pressedAt = -Infinity;
-  const release = () => {
-    clearTimeout(timer);
-    delete $("emergency").dataset.held;
-  };
+  const release = () => { clearTimeout(timer); delete $("emergency").dataset.held; };
   const finish = () => { release(); stop(); };
   const press = (event) => {
     if (event.key?.toLowerCase() !== STOP_KEY || event.ctrlKey || event.metaKey || event.altKey || needsKey(event) || $("emergency").hidden) return;

@@ -12,6 +12,7 @@ import { paintedRed, planeBefore, standingBy } from "./triangles.js";
 const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156], PLANE_COLOUR = [30, 120, 190];
 const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
 const MOST_FACES = 2000000; // of all copies together; those beyond are drawn as boxes
+const LOST = { count: 0, hues: new Float32Array(RED.map((x) => x / 255)) }; // the look of what has no place on the plate
 const ON_SECTION_MM = 1e-3;
 const ON_FACES = 1e-4; // in depth, by which lines are seen before what they lie on, and what is cut away before the plate
 
@@ -51,7 +52,7 @@ export function pictureOf(canvas, camera) {
   if (!gl) return null;
   const scene = {
     model: null, matrix: IDENTITY, place: [0, 0, 0], middle: [0, 0, 0], copies: [], box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, marks: null, pieces: null, shifts: [], chosen: 0,
-    walls: null, section: null, pedestal: null, others: null, machine: null, dark: false, extras: {},
+    walls: null, section: null, pedestal: null, others: null, machine: null, dark: false, lost: false, extras: {},
   };
   const drawn = [], toldOf = {}, stale = new Map(); // by the name of what is to be made anew before it is drawn: whether its colours alone are others
   let card = {}, frame = null, colours = null, count = 0, placed = "";
@@ -87,15 +88,16 @@ export function pictureOf(canvas, camera) {
     if (outgrown(canvas)) [canvas.width, canvas.height] = size;
     frame.begin(...size);
     if (!below) card.table.draw(ground, { lift: ON_PLATE });
-    if (card.pieces) card.pieces.draw((shift) => seenAs(moved(shift)), scene.shifts, capped);
+    const apart = scene.shifts.some((shift) => shift.some(Boolean)); // the first model alone
+    if (card.pieces && !scene.walls) for (const place of [[0, 0, 0], ...(apart ? [] : scene.copies)]) card.pieces.draw((shift) => seenAs(moved(add(place, shift))), scene.shifts, capped);
     else if (card.model) {
       card.walls.forEach((wall) => wall.draw(ground, open));
-      for (const shift of [[0, 0, 0], ...scene.copies.slice(0, bodies())]) {
-        card.model.draw(seenAs(multiply(moved(shift), scene.matrix)), { cuts: scene.cuts, ghost, ...capped });
+      for (const [k, shift] of [[0, 0, 0], ...scene.copies.slice(0, bodies())].entries()) {
+        card.model.draw(seenAs(multiply(moved(shift), scene.matrix)), { cuts: k && scene.lost ? LOST : scene.cuts, ghost, ...capped });
         card.pedestal?.draw(seenAs(moved(shift)), { ghost, ...capped });
       }
     }
-    card.others?.draw(plate(moved(scene.middle)), { ghost, ...capped });
+    card.others?.draw(plate(moved(scene.middle)), { cuts: scene.lost ? LOST : null, ghost, ...capped });
     if (below) card.table.draw(ground, { ...FROM_BELOW, lift: ON_PLATE });
     Object.keys(scene.extras).forEach((name) => card[name].draw(seenAs));
     frame.show();
@@ -175,12 +177,12 @@ export function pictureOf(canvas, camera) {
     }),
     /** The triangles of what the model stands on, in the platform's frame, and of the other models, from the middle of all, or none. */
     pedestal: take("pedestal"), others: take("others"),
-    /** Where the middle of all that is drawn but the walls and the other models stands on the plate, its copies, from there, and the middle of all. */
-    place(place, copies, middle) {
-      const told = JSON.stringify([place, copies, middle, scene.box]);
+    /** Where the middle of all that is drawn but the walls and the other models stands on the plate, its copies, from there, and the middle of all; lost: copies and others have no place there. */
+    place(place, copies, middle, lost) {
+      const told = JSON.stringify([place, copies, middle, lost, scene.box]);
       if (told === placed) return;
       placed = told;
-      Object.assign(scene, { place, copies, middle });
+      Object.assign(scene, { place, copies, middle, lost });
       const boxes = copies.slice(bodies()).flatMap((shift) => boxEdges(...scene.box.map((corner) => add(corner, shift))));
       extra("copies", boxes.length ? told : "", () => (boxes.length ? [{ lines: trianglesOf([{ corners: boxes, colour: [...MODEL_COLOUR, 255] }]) }] : []));
       ask();

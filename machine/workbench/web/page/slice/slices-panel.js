@@ -14,8 +14,8 @@ export function slicesPanel(showFinding) {
       for (const id of [`tab-${store.tab}`, "look"]) $(id).focus(); // what is hidden takes no focus
     },
   });
-  onState(({ slicing, sliced, colours }) => {
-    disable({ slice: Boolean(slicing) });
+  onState(({ slicing, sliced, colours, unsliceable }) => {
+    disable({ slice: Boolean(slicing || unsliceable), again: Boolean(unsliceable) });
     hide({ "stop-slicing": !slicing, "slicing-bar": !slicing });
     tell({ "slicing-told": slicing ? slicing.text : "" });
     showShares(slicing, colours);
