@@ -5,6 +5,7 @@ UserError                         message (one sentence: thing, value, what is a
   ProfileError                    profiles: all problems of a file or of the --set options at once
   MeshError                       mdp: unreadable, empty, open, flat: what and where
   PlanError                       mdp: a plan file, or planes that cannot be cut: which one and why
+    CutError                      one plane that cannot be cut
   SliceError                      slicer: a setting with which slicing is impossible
   MoveError                       machine: out of limits, unreachable, collision: part, axis, value, allowed
   GcodeError                      machine: a G-code text that cannot be read, with the line
@@ -84,6 +85,14 @@ class MeshError(UserError):
 
 class PlanError(UserError):
     """A plan file that cannot be used; the message names the key or the plane, and why."""
+
+
+class CutError(PlanError):
+    """A part that cannot be cut off. part: its number in the plan; reason: why, as the end of a sentence."""
+
+    def __init__(self, *sentence: object, part: int = 0, reason: str = "") -> None:
+        super().__init__(*sentence)
+        self.part, self.reason = part, reason
 
 
 class SliceError(UserError):

@@ -12,8 +12,8 @@ from machine.gcode.words import PAUSE_REMARK, split_command
 from machine.link.exchange import Exchange
 from machine.link.journal import Checkpoint, Journal
 from machine.link.line_history import Barriers, LineHistory, PlannerReports, SentLine, shifts
-from machine.link.pause.park_moves import lift_move
-from machine.link.pause.pause import COLD_C, NEAR_C, Pause
+from machine.link.pause.park_moves import extrudes, least_extrusion_c, lift_move
+from machine.link.pause.pause import Pause
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import Control, PendingCommands
 from machine.link.print_state import PrintState, PrintStatus, ProgramPosition
@@ -176,9 +176,8 @@ class Feed:
 
     def _is_cold(self) -> bool:
         """Whether the nozzle is being heated and too cold yet for a pause, which pulls filament."""
-        material_c = 0.0 if self.profile is None else self.profile.material.first_layer_nozzle_c
-        now_c, wanted_c = self.reports.temperature.nozzle_c, self.modal.nozzle_c
-        return wanted_c > 0 and now_c is not None and now_c < min(COLD_C, max(wanted_c, material_c) - NEAR_C)
+        now_c, least_c = self.reports.temperature.nozzle_c, least_extrusion_c(self.modal.nozzle_c, self.profile)
+        return extrudes(self.modal, self.profile) and now_c is not None and now_c < least_c
 
     def _prints(self, command: str) -> bool:
         """Whether not to pause before a command: a stroke, or one of a pair that turns the table."""

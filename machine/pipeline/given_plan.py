@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from machine.pipeline.project_record import RECORD
 from machine.pipeline.requests import MOST_COPIES, ModelRequest
 from machine.planning.stops import check_stop_parts, parts_in_words
 from mdp.directions.orientation import motion_between
@@ -90,6 +91,8 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
             raise PlanError(sentence)
     file = plan or planes or _plan_of_demo(request)
     given = None if file is None else read_plan(file)
+    if file is not None and given is not None and request.project is not None and (file.parent / RECORD).is_file():
+        given = replace(given, name=request.project.name)  # the user has no other file of it
     if given is not None and given.orientation is not None and request.orient is False:
         raise PlanError(f"{option('as-is')}: the plan {file} gives the model's orientation: leave one of them out")
     return given
@@ -106,22 +109,22 @@ def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
     that a modifier may not have."""
     if given is None:
         return profile
-    check_modifiers(profile, given.zones.modifiers, f"plan {given.name}")
+    check_modifiers(profile, given.zones.modifiers, given.label)
     if not given.settings:
         return profile
     try:
         with_part_settings(profile.of_all_parts, given.settings)
     except ProfileError as error:
-        raise PlanError(f"plan {given.name}: {error}") from None
+        raise PlanError(f"{given.label}{error}") from None
     return with_part_settings(profile, given.settings)
 
 
 def check_modifiers(profile: Profile, modifiers: Sequence[Modifier], where: str) -> None:
-    """Raise PlanError for settings that a modifier may not have with a profile. where: name of their source."""
+    """Raise PlanError for settings that a modifier may not have with a profile. where: beginning of the sentence."""
     for number, modifier in enumerate(modifiers, start=1):
         problems = list(problems_of_place(profile.process, modifier.process, profile.machine.head.nozzle_mm))
         if problems:
-            raise PlanError(f"{where}: " + "; ".join(f"modifier {number}: {problem}" for problem in problems))
+            raise PlanError(where + "; ".join(f"modifier {number}: {problem}" for problem in problems))
 
 
 def check_parts_possible(request: ModelRequest, given: PlanFile | None, profile: Profile) -> None:

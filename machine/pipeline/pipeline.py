@@ -104,7 +104,7 @@ def decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     mesh, read_s = model.mesh, perf_counter() - began
     for note in model.notes:
         say(f"{request.name}: {note}")
-    check_modifiers(profile, model.zones.modifiers, request.name)
+    check_modifiers(profile, model.zones.modifiers, f"{request.name}: ")
     compilers.begin((*compilers.JUDGE, *compilers.SEARCH, *(compilers.bundles_to_build(profile) if to_build else ())))
     compilers.wait_for(compilers.JUDGE)
     orientation = None if given is None or given.orientation is None else np.array(given.orientation)

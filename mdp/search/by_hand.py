@@ -26,7 +26,7 @@ from mdp.search.problem import FINEST, Problem
 from mdp.sweep.limbs import limb_mesh
 from mdp.sweep.sweep import gains
 from mdp.zone import FARTHEST_MM, Brushed, Grown, Painted
-from profiles.errors import PlanError
+from profiles.errors import CutError, PlanError
 from profiles.messages import key_name, phrase
 
 EQUAL_MM2 = 1e-6
@@ -43,14 +43,15 @@ def check_plan(plan: PlanFile, mesh: Mesh, name: str) -> None:
     """Raise PlanError if a plan belongs to another model, or names faces that the model lacks, by colour, number or point."""
     if plan.sha256 and plan.sha256 != mesh_sha256(mesh):
         raise PlanError(
-            f"plan {plan.name} was made for another model: {plan.model or 'its model'} is not {name} as it is read now "
+            f"{plan.label.removesuffix(': ') or 'the plan'} was made for another model: "
+            f"{plan.model or 'its model'} is not {name} as it is read now "
             f"(the file has changed, or {key_name('process.scale')}, {key_name('process.rotate_deg')} or "
             f"{key_name('search.pedestal_mm')}; without the line sha256 the "
             "planes are tried all the same)"
         )
     for kind in ZONE_KINDS:
         for number, zone in enumerate(getattr(plan.zones, kind), start=1):
-            label = f"plan {plan.name}: {kind} {number}:"
+            label = f"{plan.label}{kind} {number}:"
             if isinstance(zone, Painted):
                 _check_colour(zone, mesh, name, f"{label} colour is {colour_text(zone.colour)}")
             elif isinstance(zone, Brushed):
@@ -70,16 +71,18 @@ def _check_colour(zone: Painted, mesh: Mesh, name: str, label: str) -> None:
 
 
 def cut_by_hand(problem: Problem, plan: PlanFile) -> Node:
-    """The node after the cuts of all planned parts, from the last one in print order. Raises PlanError."""
+    """The node after the cuts of all planned parts, from the last one in print order. Raises PlanError, and CutError for an
+    infeasible plane.
+    """
     node, least_mm = problem.root, FINEST * problem.settings.offset_step_mm
     for number in range(len(plan.parts) + 1, 1, -1):
-        planned, label = plan.parts[number - 2], f"plan {plan.name}: part {number}"
+        planned, label = plan.parts[number - 2], f"{plan.label}part {number}"
         offset_mm = planned.offset_mm  # a grid of offsets through a plane next to the origin would have too many planes
         if offset_mm is not None and 0.0 < abs(offset_mm) < least_mm:
             raise PlanError(f"{label}: offset_mm is {offset_mm:g}: 0 or at least {least_mm:g} is allowed")
         child = try_planes(problem, node, [planned.plane or _complete(problem, node, planned, label)])
         if isinstance(child, Rejection):
-            raise PlanError(f"{label} cannot be cut off: {child.text}")
+            raise CutError(f"{label} cannot be cut off: {child.text}", part=number, reason=child.text)
         node = child
     return node
 

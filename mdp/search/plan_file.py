@@ -53,9 +53,9 @@ class PlannedPart:
 
 @dataclass(frozen=True)
 class PlanFile:
-    """The content of a plan file. name: the file's name; sha256: hash of its model, "" if it was written by hand for any model;
-    orientation: rows of the rotation applied to the model before cutting, None if there is none; parts: in print order, without
-    part 1; front: one row for every number of parts; settings: of single parts, including part 1.
+    """The content of a plan file. name: the file's name, "" if the user has no such file; sha256: hash of its model, "" if it was
+    written by hand for any model; orientation: rows of the rotation applied to the model before cutting, None if there is none;
+    parts: in print order, without part 1; front: one row for every number of parts; settings: of single parts, including part 1.
     """
 
     name: str
@@ -66,6 +66,11 @@ class PlanFile:
     zones: Zones = NO_ZONES
     front: tuple[FrontRow, ...] = ()
     settings: tuple[PartSettings, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Beginning of a sentence about a place in the plan; "" for a plan without a name, which is in no file."""
+        return self.name and f"plan {self.name}: "
 
     def row(self, most_parts: int) -> tuple[PlannedPart, ...]:
         """The parts, from the second, of the row with the most parts up to a number. Raises PlanError."""

@@ -2,6 +2,7 @@
 page that goes while a plane is in its hand."""
 
 import json
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,7 @@ from profiles.profile import load
 from tests.machine.browser import Browser
 from tests.machine.running_workbench import QUICK, Running
 from tests.machine.test_workbench_place import pixels
+from tests.machine.workbench.test_server import colours_in
 from tests.mdp.search.test_neck import hourglass
 from tests.shapes import tee
 
@@ -53,14 +55,14 @@ def test_a_plane_snaps_to_the_neck_nearby_and_where_there_is_none_that_is_told(b
         opened(page, bench, "glass.stl")
         added(page, 35.0)
         page.do("neck", part=2)
-        state = page.until(lambda state: state["undo"] == "snap to the neck")
+        state = page.until(lambda state: state["undo"] == "snap to the narrowest section")
         assert state["cuts"][0]["offset_mm"] == pytest.approx(30.0, abs=0.05)
         page.do("move", part=2, **LEVEL, offset_mm=5.0)
         page.until(lambda state: state["undo"] == "move a plane")
         page.do("neck", part=2)
         problem = page.until(lambda state: state["problem"])["problem"]
         where = "within 10 mm and 25 degrees no section is narrower than its surroundings"
-        assert problem == f"there is no neck near the plane of part 2: {where}"
+        assert problem == f"there is no narrowest section near the plane of part 2: {where}"
 
 
 def test_marks_are_in_the_plan_of_the_command_line_and_planes_that_they_forbid_are_invalid(bench: Running, folder: Path) -> None:
@@ -423,6 +425,124 @@ def test_earlier_work_is_opened_with_a_plane_that_its_mark_forbids(bench: Runnin
         opened(page, bench, "glass.stl")
         work = json.loads(bench.ask("kept")[1])[0]
         assert work["name"] == "tee.stl"
+        status, picture = bench.ask(f"kept/{work['key']}/picture")  # the whole model, as a plane cannot be cut
+        assert (status, colours_in(picture)) == (200, set())
         assert bench.ask(f"kept/{work['key']}", "POST", b"", Origin=f"http://127.0.0.1:{bench.port}")[0] == 200
         state = page.until(lambda state: state["model"]["name"] == "tee.stl" and any(state["invalid"]))
         assert state["invalid"] == ["", "its plane would pass through protected area 1"]
+
+
+def test_work_with_a_plane_in_a_protected_area_is_saved_as_project_and_plan_and_its_parts_wait_for_the_plane(
+    bench: Running, folder: Path
+) -> None:
+    why = "its plane would pass through protected area 1"
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 20.0, 35.0)
+        page.do("mark", kind="keep", min_mm=[-2, -2, 33], max_mm=[2, 2, 37])
+        state = page.until(lambda state: state["note"])
+        refused = f"part 3 cannot be cut off: {why}: move or remove its plane, or find parts again"
+        assert [state["savable"][kind][0] for kind in ("project", "plan", "parts", "pictures")] == ["", "", refused, refused]
+        for file in ("parts.zip", "pictures.zip"):
+            status, told = bench.ask(file)
+            assert (status, json.loads(told)) == (422, {"problem": refused})
+        for file, name in (("project.3mf", "kept.3mf"), ("plan.toml", "kept.toml")):
+            status, saved = bench.ask(file)
+            assert status == 200
+            Path(name).write_bytes(saved)
+        with zipfile.ZipFile("kept.3mf") as archive:
+            pictures = [archive.read(name) for name in archive.namelist() if name.endswith(".png")]
+        assert [colours_in(picture) for picture in pictures] == [{"blue"}]  # of one part
+        bench.send(Path("kept.toml"))
+        again = page.until(lambda state: state["undo"] == "open kept.toml")
+        assert again["note"].endswith(f"part 3 cannot be cut off: {why}")
+        opened(page, bench, "glass.stl")
+        bench.send(Path("kept.3mf"))
+        again = page.until(lambda state: state["model"]["name"] == "tee.stl" and any(state["invalid"]))
+        assert ([cut["offset_mm"] for cut in again["cuts"]], again["invalid"]) == ([20.0, 35.0], ["", why])
+
+
+def test_a_message_about_a_project_s_plane_names_the_project_alone(
+    bench: Running, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 20.0, 35.0)
+        page.do("mark", kind="keep", min_mm=[-2, -2, 33], max_mm=[2, 2, 37])
+        page.until(lambda state: state["note"])
+        Path("kept.3mf").write_bytes(bench.ask("project.3mf")[1])
+    capsys.readouterr()
+    assert main(["decompose", "kept.3mf", *QUICK, "-o", "parts"]) == 1
+    sentence, why = capsys.readouterr().err.splitlines()[-1], "its plane would pass through zone 1 of [[keep]], which stays whole"
+    assert sentence == f"tiltprint: plan kept.3mf: part 3 cannot be cut off: {why}"
+
+
+@pytest.mark.parametrize("file", ["", "project.3mf"])  # opened from earlier work, or from a project
+def test_found_rows_stay_as_they_were_when_work_with_a_plane_moved_by_hand_is_opened_again(
+    bench: Running, folder: Path, file: str
+) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        page.do("search", orient=False)
+        page.until(lambda state: state["front"] and not state["search"])
+        (plane,) = page.state["cuts"]
+        page.do("move", part=2, normal=plane["normal"], offset_mm=plane["offset_mm"] - 2.0)
+        before = page.until(lambda state: state["by_hand"])
+        if file:
+            Path("kept.3mf").write_bytes(bench.ask(file)[1])
+        opened(page, bench, "glass.stl")
+        if file:
+            bench.send(Path("kept.3mf"))
+        else:
+            work = json.loads(bench.ask("kept")[1])[0]
+            assert bench.ask(f"kept/{work['key']}", "POST", b"", Origin=f"http://127.0.0.1:{bench.port}")[0] == 200
+        again = page.until(lambda state: state["model"]["name"] == "tee.stl" and state["by_hand"])
+        same = ("front", "recommended", "cuts", "by_hand")
+        assert {key: again[key] for key in same} == {key: before[key] for key in same}
+        assert again["cuts"] != again["front"][1]["planes"]
+
+
+def test_a_search_with_a_locked_plane_in_a_protected_area_names_its_part_and_the_remedy(bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 20.0, 35.0)
+        page.do("lock", part=3, locked=True)
+        page.do("mark", kind="keep", min_mm=[-2, -2, 33], max_mm=[2, 2, 37])
+        page.until(lambda state: any(state["invalid"]))
+        page.do("search")
+        why = "its plane would pass through protected area 1: unlock it or take the mark back, or the setting that forbids it"
+        state = page.until(lambda state: state["problem"])
+        assert (state["problem"], state["search"]) == (f"part 3 is locked and cannot be cut off: {why}", None)
+
+
+def test_a_number_below_the_slider_keeps_the_focus_when_it_is_taken(browser: Browser, bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        looked_at(browser, bench, "tee.stl")
+        page.do("search", orient=False)
+        page.until(lambda state: state["front"] and not state["search"] and state["priced"])
+        browser.wait(f"$('front-marks').children.length === 2 && {FREE}")
+        browser.value("$('front-marks').querySelector('button').focus()")
+        browser.value("document.activeElement.click()")
+        page.until(lambda state: state["parts"] == 1)
+        browser.wait(f"$('front').value === '0' && {FREE}")
+        assert browser.value("document.activeElement.textContent") == "1"
+
+
+def test_on_a_phone_the_offset_of_a_plane_is_shown_whole(browser: Browser, bench: Running, folder: Path) -> None:
+    with bench.line() as page:
+        opened(page, bench, "tee.stl")
+        added(page, 27.14)
+        looked_at(browser, bench, "tee.stl")
+        browser.resize(390, 844)
+        browser.value("document.querySelector(\"#parts-list input[value='2']\").click()")
+        browser.wait("!$('plane-tools').hidden && $('plane-offset').value === '27.14'")
+        room_px, text_px, buttons = browser.value(
+            "(() => { const field = $('plane-offset'), style = getComputedStyle(field), text = document.createElement('span');"
+            "Object.assign(text.style, { position: 'absolute', fontFamily: style.fontFamily, fontSize: style.fontSize });"
+            "text.textContent = '-127.14'; document.body.append(text); const width = text.offsetWidth; text.remove();"
+            "return [field.clientWidth - 2 * parseFloat(style.paddingLeft), width, style.appearance]; })()"
+        )
+        assert (room_px >= text_px, buttons) == (True, "textfield")  # without the buttons that step it, which cover its end
+        assert browser.value("$('plane-tools').offsetHeight < 90")  # still one row, and one of figures
+        browser.resize(1280, 800)

@@ -100,6 +100,7 @@ def test_settings_are_found_by_other_slicers_words_and_taken_back_by_the_profile
         assert key in browser.value(keys)
     browser.value("{ $('search-settings').value = 'modifiers'; $('search-settings').dispatchEvent(new Event('input')); }")
     assert "Parts lists them under Protected areas" in browser.value("$('modifier-help').innerText")
+    assert browser.value("$('settings-count').textContent") == ""  # the help alone, not that no setting matches
     browser.click("#level-advanced")
     assert browser.value("$('ranking').checkVisibility()")
     browser.click("#level-simple")

@@ -32,6 +32,8 @@ FILL_MM_S = 3.0  # Marlin's ADVANCED_PAUSE_PURGE_FEEDRATE
 SLOWLY = 0.25  # share of the Z axis' speed for the last stretch down
 NEAR_MM = 2.0
 STILL_DEG = 0.01
+COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP and Klipper's min_extrude_temp
+NEAR_C = 10.0  # a print at a lower temperature shows that its firmware allows it
 
 
 def plan_park(
@@ -65,10 +67,22 @@ def heat_commands(modal: ModalState, profile: Profile | None) -> list[str]:
     return bed + ([wait.format(number(modal.nozzle_c))] if modal.nozzle_c > 0 else [])
 
 
+def least_extrusion_c(nozzle_c: float, profile: Profile | None) -> float:
+    """The temperature from which filament is pulled and pushed by a nozzle with this target."""
+    material_c = 0.0 if profile is None else profile.material.first_layer_nozzle_c
+    return min(COLD_C, max(nozzle_c, material_c) - NEAR_C)
+
+
+def extrudes(modal: ModalState, profile: Profile | None) -> bool:
+    """Whether the nozzle's target is one at which filament is pulled and pushed."""
+    return 0.0 < modal.nozzle_c >= least_extrusion_c(modal.nozzle_c, profile)
+
+
 def filament_commands(modal: ModalState, profile: Profile | None) -> tuple[list[str], list[str]]:
-    """Commands that retract before the tip leaves a place where it stood, and that prime at its return."""
+    """Commands that retract before the tip leaves a place where it stood, and that prime at its return; none for a nozzle that is
+    off, or that the program holds too cold for it."""
     pull, speed, extra = _filament(modal, profile)
-    if not modal.nozzle_c or not pull:
+    if not extrudes(modal, profile) or not pull:
         return [], []
     feed = f"F{60 * speed:.0f}"
     return ["M83", f"G1 E-{pull:.5f} {feed}"], ["M83", f"G1 E{pull + extra:.5f} {feed}"]

@@ -12,7 +12,7 @@ from machine.gcode.commands import command_in
 from machine.gcode.modes import Coordinates, ModalState
 from machine.gcode.pen import number
 from machine.link.exchange import Exchange
-from machine.link.pause.park_moves import fill_commands, heat_commands, plan_park
+from machine.link.pause.park_moves import COLD_C, NEAR_C, extrudes, fill_commands, heat_commands, plan_park
 from machine.link.pause.printed_bounds import PrintedBounds
 from machine.link.pending_commands import PendingCommands
 from machine.link.print_state import PrintState
@@ -20,8 +20,6 @@ from machine.link.watchdog import PrinterReports
 from profiles.profile import Profile
 
 AWAKE_S = 60.0  # half of the shortest idle time, Marlin's DEFAULT_STEPPER_TIMEOUT_SEC
-COLD_C = 170.0  # Marlin's EXTRUDE_MINTEMP and Klipper's min_extrude_temp
-NEAR_C = 10.0  # a print at a lower temperature shows that its firmware allows it
 
 
 @dataclass
@@ -54,7 +52,7 @@ class Pause:
         cooled = modal.nozzle_c > 0 and (self.off or self._has_cooled())
         yield PrintState.RESUMING, f"the nozzle is {self._heating()}" if cooled else ""
         self._send(heat_commands(modal, self.profile))
-        if cooled and self.aside and self.profile is not None:
+        if cooled and self._fills() and self.profile is not None:
             self._send(fill_commands(modal, self.profile))
         self.exchange.drain()
         self.stands, self.aside = None, False
@@ -124,8 +122,12 @@ class Pause:
         return f"{why}; {cooled}" if why else cooled
 
     def _heating(self) -> str:
-        filled = " and filled where the tip waits: take the drop off" if self.aside else ""
+        filled = " and filled where the tip waits: take the drop off" if self._fills() else ""
         return f"heated to {self.modal.nozzle_c:g} °C{filled}"
+
+    def _fills(self) -> bool:
+        """Whether a cooled nozzle is filled before it goes back."""
+        return self.aside and extrudes(self.modal, self.profile)
 
     def _send(self, commands: Iterable[str]) -> None:
         for command in commands:

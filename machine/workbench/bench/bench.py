@@ -322,8 +322,8 @@ def with_plan(bench: Bench, plan: PlanFile, rows: Sequence[FrontRow], profile: P
     return replace(bare, profile=profile, rotation=rotation, cuts=plan.parts, zones=plan.zones, rows=tuple(rows))
 
 
-def plan_of_bench(bench: Bench, name: str) -> PlanFile:
-    """The cuts and zones as a plan. Its model is the one on the bench, so it needs no hash."""
+def plan_of_bench(bench: Bench, name: str = "") -> PlanFile:
+    """The cuts and zones as a plan. Its model is the one on the bench, so it needs no hash. name: of its file."""
     orientation = None if bench.rotation == STANDING else bench.rotation
     model = "" if bench.model is None else bench.model.name
     return PlanFile(name, model, "", orientation, bench.cuts or (), bench.zones, bench.rows, tuple(bench.profile.parts))
@@ -332,7 +332,13 @@ def plan_of_bench(bench: Bench, name: str) -> PlanFile:
 def locked_plan(bench: Bench) -> PlanFile:
     """Plan with the locked planes, which a search keeps as its first cuts, and the zones."""
     parts = tuple(part for part in bench.cuts or () if part in bench.locked)
-    return PlanFile("the locked planes", parts=parts, zones=bench.zones)
+    return PlanFile("", parts=parts, zones=bench.zones)
+
+
+def locked_in_words(part: int, reason: str) -> str:
+    """Why a search cannot keep the locked plane of a part."""
+    remedy = "unlock it or take the mark back, or the setting that forbids it"
+    return f"part {part} is locked and cannot be cut off: {reason}: {remedy}"
 
 
 def laid_down(bench: Bench, normal: Floats) -> Floats:

@@ -186,8 +186,8 @@ def move(bench: Bench, *, part: int, normal: Direction, offset_mm: Mm, near: boo
 
 def snap(bench: Bench, part: int, neck: PlannedPart) -> Edit:
     """Replace the plane of a part by the neck found near it."""
-    reason = f"the neck near the plane of part {part} is no place for a cut: "
-    return Edit("snap to the neck", [(_replaced(bench, part, neck), part)], reason=reason)
+    reason = f"the narrowest section near the plane of part {part} is no place for a cut: "
+    return Edit("snap to the narrowest section", [(_replaced(bench, part, neck), part)], reason=reason)
 
 
 def limb(bench: Bench, *, part: int, point_mm: Point | None = None) -> Edit:

@@ -180,7 +180,7 @@ class SessionBase(Observable):
         self.notify()
 
     def do(self, word: str, bench: Bench, lost: str = "") -> None:
-        """Take a further step, which can be undone. lost: what it has removed, beside what its step says itself."""
+        """Take a further step, which can be undone. lost: what it has removed or made invalid, beside what its step says."""
         self.advance(self.history.do(word, bench), lost)
 
     def advance(self, history: History, lost: str = "") -> None:

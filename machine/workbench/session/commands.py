@@ -9,6 +9,7 @@ from enum import StrEnum
 from functools import partial
 from typing import Any, Literal
 
+from machine.workbench.bench.bench import locked_in_words
 from machine.workbench.bench.changes import CHANGES, EDITS, MARKINGS, WORDS, move
 from machine.workbench.bench.settings import check_known, profile_labels, with_typed, without_settings
 from machine.workbench.bench.values import Arguments, Asked, Direction, Mm, arguments_of, read_command
@@ -23,11 +24,12 @@ Work = Coroutine[Any, Any, None] | None  # remaining work of a command
 
 
 class Need(StrEnum):
-    """Requirement of a command on its bench; parts: cuts or marks; slices: current ones."""
+    """Requirement of a command on its bench; parts: cuts or marks; cut: these, without an invalid plane; slices: current ones."""
 
     NOTHING = "nothing"
     MODEL = "model"
     PARTS = "parts"
+    CUT = "cut"
     SLICES = "slices"
 
 
@@ -35,8 +37,10 @@ def lacking(session: Session, need: Need) -> str:
     """Sentence on why a bench does not meet a requirement; "" if it does."""
     if need != Need.NOTHING and session.bench.model is None:
         return "there is no model on the workbench yet: choose a file first"
-    if need == Need.PARTS and not session.bench.planned:
+    if need in (Need.PARTS, Need.CUT) and not session.bench.planned:
         return "there are no parts yet: find them, or add a plane"
+    if need == Need.CUT:
+        return session.trials.unsliceable()
     return session.slicing.lacking() if need == Need.SLICES else ""
 
 
@@ -61,7 +65,10 @@ def dismiss(session: Session) -> None:
 
 
 def search(session: Session, *, orient: bool = True, ranker: str = CLASSIC) -> None:
-    """Find the parts, as `find_parts` does."""
+    """Find the parts, as `find_parts` does, unless a locked plane is known to be invalid."""
+    for part, cut in enumerate(session.bench.cuts or (), start=2):
+        if cut in session.bench.locked and (reason := session.trials.invalid.get(cut)):
+            raise PlanError(locked_in_words(part, reason))
     session.finding.search(orient, ranker.strip() or CLASSIC)
 
 

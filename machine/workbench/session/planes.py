@@ -197,7 +197,8 @@ class PlaneTrials:
             nowhere = "; shifted along its normal it cannot be cut either" if edit.near else ""
             raise PlanError(f"{edit.reason}part {trial.rejected_part} cannot be cut off: {trial.rejected}{nowhere}")
         self.trial = None if aside else (bench, cuts, trial)  # others may be valid without what was moved or removed
-        self._session.do(edit.word, with_cuts(bench, cuts))
+        after = with_cuts(bench, cuts)
+        self._session.do(edit.word, after, await self.recheck(after) if aside else "")
         (wanted, number), moved = edit.orders[0], [plane for plane in cuts if plane not in edit.cuts]
         if moved:
             self._session.add_note(_moved_in_words(wanted[number - 2], moved[0]))
@@ -208,11 +209,11 @@ class PlaneTrials:
         check_unlocked(bench, part)
         assert bench.model is not None
         reach_mm = REACH_SHARE * hypot(*bench.model.size_mm)
-        with self._session.waiting(f"looking for a neck near the plane of part {part}"):
+        with self._session.waiting(f"looking for the narrowest section near the plane of part {part}"):
             neck = await self._readiness.ask(near_neck, bench, bench.cuts, part, reach_mm, tuple(self.invalid))
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no section is narrower than its surroundings"
-            raise PlanError(f"there is no neck near the plane of part {part}: {where}")
+            raise PlanError(f"there is no narrowest section near the plane of part {part}: {where}")
         normal, offset_mm = vector_of(neck.normal), float(neck.offset_mm)
         nearer = {"do": "move", "part": part, "normal": list(normal), "offset_mm": offset_mm, "near": True}
         await self.take(snap(bench, part, PlannedPart(normal, offset_mm)), nearer)

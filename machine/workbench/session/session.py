@@ -34,7 +34,7 @@ from machine.workbench.bench.values import with_value
 from machine.workbench.session.base import Derived, SessionBase, Value, asking
 from machine.workbench.session.keeping import Keeping
 from machine.workbench.session.long_work import Comparing, Finding, Slicing, price_by_hand, prices_of
-from machine.workbench.session.planes import PlaneTrials, Readiness, plated_of, resting_of, standing_of
+from machine.workbench.session.planes import PlaneTrials, Readiness, invalid_in_words, plated_of, resting_of, standing_of
 from machine.workbench.work.cutting import draw_pieces, measure_plan
 from machine.workbench.work.folders import files_in, new_folder
 from machine.workbench.work.models import Unscaled, read_model
@@ -48,7 +48,7 @@ from mdp.search.plan_file import PlanFile, planned_parts
 from mdp.search.plan_reading import read_plan
 from mdp.zone import NO_ZONES
 from profiles.effect import effect_of_change
-from profiles.errors import MeshError, PlanError, UserError
+from profiles.errors import CutError, MeshError, PlanError
 from profiles.frozen import Effect
 from profiles.profile import Profile
 
@@ -161,9 +161,9 @@ class Session(SessionBase):
             model = await self._read(path, name, bench.profile)
         self.do(f"add {name} to the plate", with_beside(bench, (*bench.beside, (model, 1))))
 
-    async def _replace(self, word: str, bench: Bench) -> None:
-        """Take other work onto the bench, after what lies there is kept."""
-        self.do(word, bench, await self.keeping.put_away())
+    async def _replace(self, word: str, bench: Bench, note: str = "") -> None:
+        """Take other work onto the bench, after what lies there is kept. note: a sentence about that work."""
+        self.do(word, bench, "; ".join(filter(None, (await self.keeping.put_away(), note))))
 
     async def open_gcode(self, path: Path, name: str) -> None:
         """Dry-run a G-code file for display and printing, independent of the bench. Raises UserError."""
@@ -254,7 +254,7 @@ class Session(SessionBase):
         self.readiness.load()
         profile = profile_as_given(project.given, self.bench.profile.of_all_parts)
         check_block(profile, "")
-        plan = None if project.plan is None else _read_plan(project.plan)
+        plan = None if project.plan is None else replace(_read_plan(project.plan), name="")
         with self.waiting(f"reading {project.name}"):
             model = await self._read(await self._copy_of(project.name, project.model), project.name, profile, project.plate)
             others = [(name, await self._copy_of(name, file), copies) for name, file, copies in project.beside]
@@ -263,12 +263,7 @@ class Session(SessionBase):
             bench = with_rotation(uncut, project.rotation)
             if plan is not None:
                 marks = NO_ZONES if project.marks_in_plan else bench.zones
-                rows: tuple[FrontRow, ...] = ()
-                try:
-                    rows = await self.quick.run(measure_plan, uncut, plan)
-                except UserError:
-                    if not await self.trials.find_invalid(with_plan(uncut, plan, (), profile)):
-                        raise  # else they were invalid when it was saved
+                rows, _ = await self._measured(uncut, plan, profile, project.recommended)
                 bench = with_rotation(with_plan(uncut, plan, rows, with_plan_settings(profile, plan)), project.rotation)
                 bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
         bench = bench if project.parts else replace(bench, cuts=None)
@@ -295,8 +290,21 @@ class Session(SessionBase):
             raise PlanError(f"plan {plan.name}: there is no model on the workbench to cut by it: open {wanted} first")
         with self.waiting(f"cutting by {plan.name}"):
             profile = with_plan_settings(bench.profile.of_all_parts, plan)
-            rows = await self.quick.run(measure_plan, bench, plan)
-        await self._replace(f"open {plan.name}", with_plan(bench, plan, rows, profile))
+            rows, invalid = await self._measured(bench, plan, profile)
+        await self._replace(f"open {plan.name}", with_plan(bench, plan, rows, profile), invalid)
+
+    async def _measured(
+        self, bench: Bench, plan: PlanFile, profile: Profile, recommended: int = 0
+    ) -> tuple[tuple[FrontRow, ...], str]:
+        """The front of a plan, and a sentence about planes that cannot be cut, which may have been invalid when it was saved;
+        there is then no front. recommended: see `measure_plan`. Raises UserError."""
+        try:
+            return await self.quick.run(measure_plan, bench, plan, recommended), ""
+        except CutError:
+            cut = with_plan(bench, plan, (), profile)
+            if not (invalid := await self.trials.find_invalid(cut)):
+                raise
+            return (), invalid_in_words(cut, invalid)
 
     async def make(self, word: str, task: Callable[..., Value], *given: Any) -> Value:
         """Run a task on the parts of the bench. Raises UserError if they cannot be cut."""
@@ -307,7 +315,7 @@ class Session(SessionBase):
         """The parts as separate bodies, packed by `work.pieces`; an empty file if they cannot be cut, as the trials report."""
         out, before = self.new_file(), self.pieces.done
         out.touch()
-        with suppress(UserError):
+        with suppress(CutError):
             await self.quick.run(draw_pieces, bench, out)
         if before is not None and not self.pieces.stale:
             before.unlink(missing_ok=True)

@@ -29,7 +29,7 @@ from machine.workbench.bench.page_words import page_words
 from machine.workbench.bench.settings import export_command, file_stem, profile_labels, settings_list, settings_of
 from machine.workbench.printing.prints import Prints
 from machine.workbench.session.base import hear_from, in_loop
-from machine.workbench.session.commands import Need, check_need
+from machine.workbench.session.commands import Need, check_need, lacking
 from machine.workbench.session.planes import pedestal_key
 from machine.workbench.session.session import Session, Workbench
 from machine.workbench.web.line import CLOSED, devices_line, refuse_closed, talk
@@ -267,9 +267,9 @@ def _of_sessions(workbench: Workbench, page: tuple[bytes, str], uploads: Uploads
         route("project.3mf", _made_file("saving the project", make_project, "model/3mf", ".3mf"), need=Need.MODEL),
         route("plan.toml", plan, need=Need.PARTS),
         route("profile/{kind}.toml", profile),
-        route("pieces", _pieces, need=Need.PARTS),
-        route("parts.zip", _made_file("cutting the parts", make_folder, ZIP, "-parts.zip"), need=Need.PARTS),
-        route("pictures.zip", _made_file("drawing the parts", make_pictures, ZIP, "-pictures.zip"), need=Need.PARTS),
+        route("pieces", _pieces),
+        route("parts.zip", _made_file("cutting the parts", make_folder, ZIP, "-parts.zip"), need=Need.CUT),
+        route("pictures.zip", _made_file("drawing the parts", make_pictures, ZIP, "-pictures.zip"), need=Need.CUT),
         route("print/{key}", _sliced_file(lambda sliced: sliced.page, "text/html")),  # has its own content security policy
         route("print/{key}/text", _sliced_file(lambda sliced: sliced.gcode, "text/plain")),  # whatever the dry run found
         route("walls/{number:int}/{part:int}", print_walls),
@@ -355,6 +355,9 @@ async def _facets(session: Session, request: Request) -> Response:
 
 
 async def _pieces(session: Session, request: Request) -> Response:
+    """The parts as separate bodies; nothing if they cannot be cut, or are no longer there."""
+    if lacking(session, Need.PARTS):
+        return Response(status_code=204)
     path = await session.pieces.get()
     return FileResponse(path, media_type=BYTES) if path.stat().st_size else Response(status_code=204)
 

@@ -267,14 +267,14 @@ def _plate_state(session: Session) -> dict[str, Any]:
 
 def _savable(session: Session) -> dict[str, tuple[str, str]]:
     """Each kind of file that can be saved: why it cannot be ("" if it can), and its description."""
-    model, parts, slices = (lacking(session, need) for need in (Need.MODEL, Need.PARTS, Need.SLICES))
+    model, parts, cut, slices = (lacking(session, need) for need in (Need.MODEL, Need.PARTS, Need.CUT, Need.SLICES))
     latest, given = session.slicing.latest(), session.bench.given
     errors, compared = latest is not None and latest.sliced.errors, ", with the comparison" if session.comparing.rows() else ""
     entries = {
         "project": (model, "3MF with model, parts, marks and profiles, to open here or on another computer"),
         "plan": (parts, "orientation and cuts, to open here again"),
-        "parts": (parts, "zip of an STL file for each part, a coloured 3MF and the plan"),
-        "pictures": (parts, "zip of PNGs: the parts, the print order, every number of parts"),
+        "parts": (cut, "zip of an STL file for each part, a coloured 3MF and the plan"),
+        "pictures": (cut, "zip of PNGs: the parts, the print order, every number of parts"),
         "gcode": (slices, "the dry run found errors: confirm before saving" if errors else "for the printer"),
         "page": (slices, f"one HTML file that opens anywhere{compared}"),
     }

@@ -118,7 +118,7 @@ class Uploads:
             if not picture.is_file() or modified_s(picture) < modified_s(folder / RECORD):
                 await session.aside.run(draw_kept, folder, picture)
             return Response(await asyncio.to_thread(picture.read_bytes), media_type="image/png")
-        return Response("there is no picture of this work\n", 404)
+        return Response(status_code=204)  # no error: the list on the page may be older than the work
 
     async def open_kept(self, session: Session, request: Request) -> Response:
         folder = _kept_folder(request)

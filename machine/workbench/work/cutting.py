@@ -25,7 +25,7 @@ from machine.quantities import newtons
 from machine.view.encoding import pack
 from machine.view.parts import page_colours, part_colours
 from machine.view.scene import solids, surfaces
-from machine.workbench.bench.bench import Bench, locked_plan, plan_of_bench
+from machine.workbench.bench.bench import Bench, locked_in_words, locked_plan, plan_of_bench
 from machine.workbench.bench.changes import Cuts
 from machine.workbench.bench.page_words import page_words
 from machine.workbench.work.folders import work_of
@@ -36,22 +36,24 @@ from mdp.joint import flaw_of, joints_of
 from mdp.kernels.workers import Tell
 from mdp.mesh import Floats, Mesh
 from mdp.model_file import locate
+from mdp.pedestal import on_pedestal
 from mdp.plane import Plane
 from mdp.ranking.ranker import CLASSIC, ranker_named
 from mdp.read import read_model
 from mdp.save import FOLDER_FILES, glb, part_file, stl, threemf
 from mdp.search.orient import orient_and_decompose
-from mdp.search.plan_file import PlanFile, PlannedPart, plan_of, planned_parts
+from mdp.search.parts import one_piece
+from mdp.search.plan_file import PlanFile, PlannedPart, mesh_sha256, plan_of, planned_parts
 from mdp.search.plan_reading import read_plan
 from mdp.search.plan_writing import plan_text
 from mdp.search.search import SearchRequest, cut_by_plan, decompose
 from mdp.search.trial import Trial, Trials
 from mdp.zone import NO_ZONES
-from profiles.errors import MoveError, PlanError
+from profiles.errors import CutError, MoveError, PlanError
 from profiles.files import write_whole
+from profiles.machine import Machine
 from profiles.profile import Profile, load
 
-PLAN_NAME = "plan.toml"
 AS_IT_STANDS = "to keep the file's: Undo, then clear “Also choose the best orientation” and find parts again"  # the page's label
 ZIP_DATE = (1980, 1, 1, 0, 0, 0)  # makes the bytes reproducible
 UNTILTED = 1.0 - 1e-9  # least cosine between normals that differ by rounding only
@@ -106,9 +108,12 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
             tell(Searched(f"{otherwise}trying cut {stage}, {left}", best))
 
         by_hand = with_shapes(bench, locked, candidate)
-        return decompose(
-            candidate, name, profile, SearchRequest(ranker=ranker, on_stage=show, on_phase=say, plan=by_hand, price=price)
-        )
+        request = SearchRequest(ranker=ranker, on_stage=show, on_phase=say, plan=by_hand, price=price)
+        try:
+            return decompose(candidate, name, profile, request)
+        except CutError as error:  # its number is that among the locked planes
+            part = (bench.cuts or ()).index(locked.parts[error.part - 2]) + 2
+            raise PlanError(locked_in_words(part, error.reason)) from None
 
     untouched = bench.turned is None and not locked.parts and locked.zones == NO_ZONES
     if orient and untouched and lies_freely(profile):
@@ -121,8 +126,13 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
     return Found(decomposition.front, (*decomposition.notes, *standing_in_words(mesh, profile)))
 
 
-def measure_plan(tell: Tell, bench: Bench, plan: PlanFile) -> tuple[FrontRow, ...]:
-    """The measured front of a plan for the model on the bench. Raises PlanError if it cannot be cut."""
+def measure_plan(tell: Tell, bench: Bench, plan: PlanFile, recommended: int = 0) -> tuple[FrontRow, ...]:
+    """The measured front of a plan for the model on the bench. recommended: number of parts that the search preferred. A front
+    that was found stays as it is if the plan's parts have been changed by hand since. Raises PlanError if they cannot be cut."""
+    found = {row.parts: planned_parts(row) for row in plan.front}
+    if found and plan.parts not in found.values():
+        cut_bench(bench, replace(plan, front=()))
+        plan = replace(plan, parts=found.get(recommended, next(iter(found.values()))))
     return cut_bench(bench, plan, prices=True).front
 
 
@@ -131,7 +141,7 @@ def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
     row = bench.rows[number]
     with suppress(PlanError):
         parts = planned_parts(row)
-        cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), parts=parts, front=()), prices=True)
+        cut = cut_bench(bench, replace(plan_of_bench(bench), parts=parts, front=()), prices=True)
         by_hand = sum(1 for _ in takewhile(bench.locked.__contains__, reversed(parts)))
         flaw = flaw_of(cut.mesh, cut.parts, bench.profile, by_hand)
         return replace(row, flaw=flaw) if flaw else cut.front[0]
@@ -140,38 +150,52 @@ def price_row(tell: Tell, bench: Bench, number: int) -> FrontRow:
 
 def price_cuts(tell: Tell, bench: Bench) -> FrontRow:
     """The row of the planes on the bench with its time and plastic. Raises PlanError where they cannot be cut."""
-    cut = cut_bench(bench, replace(plan_of_bench(bench, PLAN_NAME), front=()), prices=True)
+    cut = cut_bench(bench, replace(plan_of_bench(bench), front=()), prices=True)
     return next(row for row in cut.front if row.chosen)
 
 
 def make_plan(tell: Tell, bench: Bench) -> str:
-    """The plan of the bench's parts, as text."""
-    return _plan_and_meshes(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench)[0]
+    """The plan of the bench, as text; also if it cannot be cut."""
+    plan, _ = with_meshes_beside(_saved_plan(bench)[0])
+    return plan_text(plan)
 
 
 def make_project(tell: Tell, bench: Bench, out: Path) -> None:
-    decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
-    check_stop_parts(bench.stops, len(decomposition.parts))
+    """Write the project of the bench. Its picture shows the parts, or the whole model if they cannot be cut."""
+    check_stop_parts(bench.stops, max(bench.parts, 1))
+    plan, cut = _saved_plan(bench)
     compilers.wait_for(compilers.PICTURES)
-    picture = png_bytes(parts_together(decomposition, bench.profile, PICTURE_PX))
-    plan = plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts)
-    out.write_bytes(project_bytes(work_of(bench), plan, decomposition.mesh, picture))
+    picture = png_bytes(parts_together(cut, bench.profile, PICTURE_PX))
+    out.write_bytes(project_bytes(work_of(bench), plan, cut.mesh, picture))
+
+
+def _saved_plan(bench: Bench) -> tuple[PlanFile, Decomposition]:
+    """The plan of the bench for a file, and its parts, one piece if they cannot be cut. A front that was found stays as it is."""
+    plan = plan_of_bench(bench)
+    try:
+        cut = cut_bench(bench, plan)
+    except CutError:
+        mesh = on_pedestal(turned_mesh(bench), bench.profile.search.pedestal_mm)
+        return replace(plan, sha256=mesh_sha256(mesh)), in_one_piece(plan.model, mesh, bench.profile.machine)
+    measured = plan_of(cut)
+    parts = tuple(replace(part, remark=own.remark) for part, own in zip(plan.parts, measured.parts, strict=True))
+    return replace(plan, sha256=measured.sha256, parts=parts, front=plan.front or measured.front), cut
+
+
+def in_one_piece(name: str, mesh: Mesh, machine: Machine) -> Decomposition:
+    """A mesh as one part."""
+    return Decomposition(name, mesh, (one_piece(mesh, machine),), 1, CLASSIC, 0.0, 0.0, 0, 0, 0.0)
 
 
 def make_folder(tell: Tell, bench: Bench, out: Path) -> None:
     """Write the folder of `decompose -o` as a zip file."""
-    decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+    decomposition = cut_bench(bench, plan_of_bench(bench))
     parts = [(part_file(part.index), stl(part.mesh)) for part in decomposition.parts]
     model, _, plan, scene = FOLDER_FILES
-    text, meshes = _plan_and_meshes(decomposition, bench)
+    with_files, meshes = with_meshes_beside(plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts))
     beside = [(name, file.read_bytes()) for name, file in meshes.items()]
-    write_zip(out, [*parts, *beside, (model, threemf(decomposition)), (plan, text.encode()), (scene, glb(decomposition))])
-
-
-def _plan_and_meshes(decomposition: Decomposition, bench: Bench) -> tuple[str, dict[str, Path]]:
-    """The plan as text, and the mesh files that it expects beside it, by name."""
-    plan, meshes = with_meshes_beside(plan_of(decomposition, bench.zones, bench.turned, bench.profile.parts))
-    return plan_text(plan), meshes
+    own = (model, threemf(decomposition)), (plan, plan_text(with_files).encode()), (scene, glb(decomposition))
+    write_zip(out, [*parts, *beside, *own])
 
 
 def write_zip(out: Path, files: Sequence[tuple[str, bytes]]) -> None:
@@ -212,7 +236,7 @@ def turned_mesh(bench: Bench, plan: PlanFile | None = None) -> Mesh:
 
 def draw_pieces(tell: Tell, bench: Bench, out: Path) -> None:
     """Write the parts of the bench, for the page to draw separately."""
-    out.write_bytes(pieces_block(cut_bench(bench, plan_of_bench(bench, PLAN_NAME)), bench.profile))
+    out.write_bytes(pieces_block(cut_bench(bench, plan_of_bench(bench)), bench.profile))
 
 
 def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
@@ -242,7 +266,7 @@ def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:
 
 
 def draw_kept(tell: Tell, folder: Path, out: Path) -> None:
-    """Write the small picture of autosaved work: its parts, or its model if that is not cut. Raises UserError."""
+    """Write the small picture of autosaved work: its parts, or its model if that is not or cannot be cut. Raises UserError."""
     project = read_folder(folder)
     given, name = project.given, project.name
     profile = load(given.machine, given.material, given.process, given.settings)
@@ -253,8 +277,9 @@ def draw_kept(tell: Tell, folder: Path, out: Path) -> None:
     if project.plan is not None and project.parts > 1:
         compilers.wait_for(compilers.JUDGE)
         plan = replace(read_plan(project.plan), front=())
-        meshes = [part.mesh for part in cut_by_plan(mesh, name, profile, SearchRequest(plan=plan)).parts]
-        colours = [(r, g, b) for r, g, b in part_colours(len(meshes)).tolist()]
+        with suppress(CutError):  # then the model is shown whole
+            meshes = [part.mesh for part in cut_by_plan(mesh, name, profile, SearchRequest(plan=plan)).parts]
+            colours = [(r, g, b) for r, g, b in part_colours(len(meshes)).tolist()]
     compilers.wait_for(compilers.PICTURES)
     with suppress(OSError):  # another page removes the work meanwhile
         write_whole(out, small_picture(meshes, colours))
@@ -262,7 +287,7 @@ def draw_kept(tell: Tell, folder: Path, out: Path) -> None:
 
 def make_pictures(tell: Tell, bench: Bench, out: Path) -> None:
     """Write the pictures of `--png`, `--sheet` and `--front` for the bench's parts as a zip file."""
-    decomposition = cut_bench(bench, plan_of_bench(bench, PLAN_NAME), prices=True)
+    decomposition = cut_bench(bench, plan_of_bench(bench), prices=True)
     compilers.wait_for(compilers.PICTURES)
     images = {
         "parts.png": parts_picture(decomposition, bench.profile),
@@ -321,7 +346,7 @@ def _trials(number: int, bench: Bench, aside: Cuts = ()) -> Trials:
         _ready = None  # two at once would need too much memory
         compilers.wait_for((*compilers.JUDGE, *compilers.SEARCH))
         mesh = turned_mesh(bench)
-        zones = with_shapes(bench, plan_of_bench(bench, PLAN_NAME), mesh).zones
+        zones = with_shapes(bench, plan_of_bench(bench), mesh).zones
         trials = Trials(mesh, bench.profile, zones)
         trials.warm()
         _ready = number, trials

@@ -22,15 +22,13 @@ from machine.pipeline.requests import ModelRequest
 from machine.planning.fit import Place, standing_at
 from machine.workbench.bench.bench import Bench, plan_of_bench
 from machine.workbench.bench.model import Model, mesh_blocks
-from machine.workbench.work.cutting import PLAN_NAME, cut_bench, turned_mesh
+from machine.workbench.work.cutting import cut_bench, in_one_piece, turned_mesh
 from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition
 from mdp.kernels.workers import Tell
 from mdp.mesh import Mesh, together
 from mdp.model_file import DEMO
 from mdp.pedestal import on_pedestal
-from mdp.ranking.ranker import CLASSIC
-from mdp.search.parts import one_piece
 from profiles.errors import MeshError, PlanError
 from profiles.files import write_whole
 from profiles.machine import Table
@@ -46,7 +44,7 @@ Cut = tuple[Decomposition, list[PartSettings]]  # another model, and the setting
 def plated(bench: Bench, others: Path, report: Callable[[str], None]) -> tuple[Decomposition, Profile]:
     """The parts of all models on the plate, as for `export MODEL:COPIES ...`, and the profile to print them with. others: the
     file of the other models' parts, which receives those that it lacks."""
-    cut = cut_bench(bench, plan_of_bench(bench, PLAN_NAME))
+    cut = cut_bench(bench, plan_of_bench(bench))
     if not bench.beside:
         return on_one_plate([cut] * bench.copies, as_turned(bench.profile, bench.turned))
     profile, known = bench.profile.of_all_parts, known_cuts(others)
@@ -118,13 +116,11 @@ def put_on_plate(tell: Tell, bench: Bench, others: Path, drawn: Path) -> Plated:
             mesh = on_pedestal(mesh, height_mm)
         except MeshError as error:
             problem = problem or f"{error}"
-        return Decomposition(name, mesh, (one_piece(mesh, machine),), 1, CLASSIC, 0.0, 0.0, 0, 0, 0.0)
+        return in_one_piece(name, mesh, machine)
 
     known = known_cuts(others) if bench.beside else {}
     try:
-        cut = (
-            cut_bench(bench, plan_of_bench(bench, PLAN_NAME)) if bench.parts > 1 else uncut(bench.model.name, turned_mesh(bench))
-        )
+        cut = cut_bench(bench, plan_of_bench(bench)) if bench.parts > 1 else uncut(bench.model.name, turned_mesh(bench))
     except PlanError as error:
         cut, problem = uncut(bench.model.name, turned_mesh(bench)), f"{error}"
     models = [cut] * bench.copies

@@ -16,7 +16,7 @@ from weakref import WeakKeyDictionary
 
 from machine.crash import bug_in_words
 from mdp.kernels.workers import CallError, KilledError, Tell, Worker, tell
-from profiles.errors import UserError
+from profiles.errors import CutError, UserError
 
 CLOSED = "this bench is closed: nothing is worked out for it any more"
 REST_AFTER_S = 300.0  # idle time after which a process ends: each holds some 200 MB
@@ -132,14 +132,15 @@ class TaskQueue:
                     await self._ask(load)
 
     async def run(self, task: Callable[..., Value], *given: Any, tell: Tell = lambda value: None) -> Value:
-        """Run a task and return its result. Raises UserError with its message; a cancelled task is stopped at once."""
+        """Run a task and return its result. Raises UserError with its message, CutError as it is; a cancelled task is stopped at
+        once."""
         try:
             async with self._lock:
                 value, trouble = await self._ask(do, task, *given, tell=tell)
         except KilledError:
             raise UserError("the process that did this work has ended before it was done: try it again") from None
-        if trouble:
-            raise UserError(trouble)
+        if trouble is not None:
+            raise trouble
         result: Value = value
         return result
 
@@ -162,11 +163,13 @@ def load() -> None:
         import_module(f"machine.workbench.work.{name}")
 
 
-def do(task: Callable[..., Value], *given: Any) -> tuple[Value | None, str]:
-    """In a worker: run a task; returns its result and a sentence on why there is none, or ""; a bug gets a log file."""
+def do(task: Callable[..., Value], *given: Any) -> tuple[Value | None, UserError | None]:
+    """In a worker: run a task; returns its result and the error because of which there is none; a bug gets a log file."""
     try:
-        return task(tell, *given), ""
+        return task(tell, *given), None
+    except CutError as error:  # sessions continue without what cannot be cut
+        return None, error
     except UserError as error:
-        return None, f"{error}"
+        return None, UserError(f"{error}")
     except Exception as error:  # noqa: BLE001 - a bug becomes a sentence, and the workbench continues
-        return None, bug_in_words(error, sys.argv)
+        return None, UserError(bug_in_words(error, sys.argv))

@@ -147,6 +147,28 @@ def test_a_pause_that_is_wanted_before_the_nozzle_is_hot_waits_for_it_so_that_no
     assert "it pauses once it is hot" in [progress.message for progress in watcher.shown if progress.state == "pausing"][:2]
 
 
+def test_a_pause_at_a_nozzle_that_the_program_holds_cold_begins_and_moves_no_filament() -> None:
+    start = [line.replace("S200", "S150") for line in START]
+    moves = [f"G0 X{10 + k % 7} Y{10 + k % 5}" for k in range(40)]
+    program = [*start, *POSED, *moves, "M109 S200", *BODY, "M104 S0", "M140 S0"]
+    watcher = watched({len(START) + 20: Command.PAUSE, "paused": Command.RESUME})
+    assert not watcher.run(program).cancelled
+    (paused, *_) = [progress for progress in watcher.shown if progress.state == "paused"]
+    assert paused.temperature.nozzle_target_c == 150.0
+    before = watcher.lines()[: watcher.lines().index("M109 S200")]
+    assert not [line for line in before if re.match(r"G1 E", line)]
+    assert is_exact(watcher)
+
+
+def test_an_emergency_stop_that_halts_the_printer_shows_heaters_without_targets() -> None:
+    watcher = watched({150: Command.EMERGENCY_STOP})
+    with pytest.raises(FirmwareError):
+        watcher.run(PROGRAM)
+    before, after = (progress.temperature for progress in (watcher.shown[-2], watcher.shown[-1]))
+    assert (before.nozzle_target_c, before.bed_target_c) == (200.0, 60.0)
+    assert (after.nozzle_target_c, after.bed_target_c) == (0.0, 0.0)
+
+
 def test_the_targets_of_a_cancelled_print_are_off_as_soon_as_the_printer_has_said_so() -> None:
     watcher = watched({150: Command.CANCEL})
     assert watcher.run(PROGRAM).heaters_off

@@ -369,6 +369,20 @@ def test_another_machine_keeps_all_planes_and_tells_which_it_cannot_cut(bench: R
         page.do("undo")
 
 
+def test_a_machine_sent_as_a_file_keeps_the_settings_that_it_allows_and_names_the_others(bench: Running, folder: Path) -> None:
+    (folder / "fine.toml").write_text('inherits = "generic_ac"\n[machine]\nname = "fine"\n[machine.head]\nnozzle_mm = 0.2\n')
+    with bench.line() as page:
+        for key, value in (("process.walls", "4"), ("process.layer_height_mm", "0.3")):
+            page.do("set", key=key, value=value)
+        page.until(lambda state: len(state["given"]["settings"]) == 2)
+        assert bench.send(folder / "fine.toml")[0] == 200
+        state = page.until(lambda state: state["undo"] == "take fine.toml")
+        assert state["note"] == "Layer height is as in the profile, which does not allow your value"
+        assert (state["given"]["settings"], state["problem"]) == (["process.walls=4"], "")
+        page.do("undo", count=3)
+        page.until(lambda state: not state["given"]["settings"] and state["given"]["machine"] == "generic_ac")
+
+
 def colours_in(picture: bytes) -> set[str]:
     """Which of the first two parts a picture shows."""
     pixels = np.array(Image.open(io.BytesIO(picture)).convert("RGBA"), dtype=int).reshape(-1, 4)
@@ -408,7 +422,7 @@ def test_work_by_hand_is_put_away_when_another_model_is_opened_and_lies_there_as
             status, picture = bench.ask(f"kept/{work['key']}/picture")
             assert (status, colours_in(picture)) == (200, {"orange", "blue"})
             assert len(picture) < 20_000
-        assert bench.ask("kept/nothing/picture")[0] == 404
+        assert bench.ask("kept/nothing/picture") == (204, b"")  # a page is not told of an error
         assert bench.ask(f"kept/{work['key']}", "POST", Origin=origin)[0] == 200
         again = page.until(lambda state: name_of(state) == "own.stl")
         assert {key: again[key] for key in FOUND} == {key: searched[key] for key in FOUND}

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import Callable, Coroutine
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -26,7 +27,7 @@ from mdp.decomposition import FrontRow
 from mdp.plane import Plane
 from mdp.search.plan_file import PlannedPart
 from mdp.search.trial import Trial
-from profiles.errors import PlanError
+from profiles.errors import CutError, PlanError, UserError
 from profiles.messages import advice, option
 from profiles.profile import Profile, load
 from tests.machine.workbench.models import model
@@ -423,6 +424,69 @@ def test_an_invalid_plane_is_removed_even_if_another_one_is_invalid_without_it()
     session = when_done(work)
     assert (session.bench.cuts, session.problem) == ((low,), "")
     assert session.note == "part 2 cannot be cut off: a sliver stays"
+
+
+def forbidding(*reasons: tuple[PlannedPart, str]) -> Callable[..., Coroutine[Any, Any, Any]]:
+    """Answers of the processes where these planes cannot be cut; closer trials alone are made."""
+
+    async def answer(task: Any, *given: Any, **more: Any) -> Any:
+        if task.__name__ != "try_cuts":
+            return Standing((40.0, 8.0, 40.0), 0.0, "") if task.__name__ == "stand" else None
+        cuts, most_cuts, aside = given[2:5]
+        if most_cuts == 0:
+            await asyncio.sleep(0.1)  # the figures come later than the command
+        rejected = {plane: reason for plane, reason in reasons if plane in cuts and plane not in aside}
+        return next((Trial((), cuts.index(plane) + 2, reason) for plane, reason in rejected.items()), Trial(()))
+
+    return answer
+
+
+def test_an_invalid_plane_that_is_put_into_an_impossible_order_is_reported() -> None:
+    low, high = PlannedPart(UP, 5.0), PlannedPart(UP, 25.0)
+
+    async def work(session: Session) -> None:
+        session.hand.run = forbidding((high, "it is marked"))  # type: ignore[assignment, method-assign]
+        session.do("cut", replace(session.bench, cuts=(low, high)))
+        await settled(session)
+        session.hand.run = forbidding((high, "nothing is left above"))  # type: ignore[assignment, method-assign]
+        obey(session, {"do": "reorder", "part": 3, "to": 2})
+
+    session = when_done(work)
+    assert (session.bench.cuts, session.note) == ((high, low), "part 2 cannot be cut off: nothing is left above")
+
+
+def test_a_plane_is_moved_beside_one_of_which_it_is_not_known_yet_that_it_is_invalid() -> None:
+    low, high, lower = (PlannedPart(UP, offset_mm) for offset_mm in (5.0, 25.0, 4.0))
+
+    async def work(session: Session) -> None:
+        session.hand.run = forbidding((high, "it is marked"))  # type: ignore[assignment, method-assign]
+        session.do("cut", replace(session.bench, cuts=(low, high)))
+        obey(session, {"do": "move", "part": 2, "normal": [*UP], "offset_mm": 4.0})
+
+    session = when_done(work)
+    assert (session.bench.cuts, session.problem) == ((lower, high), "")
+    assert session.note == "part 3 cannot be cut off: it is marked"
+
+
+@pytest.mark.parametrize(
+    ("error", "told"), [(CutError("part 2 cannot be cut off: it is marked"), ""), (UserError("a bug"), "a bug")]
+)
+def test_parts_that_cannot_be_drawn_tell_why_unless_a_plane_cannot_be_cut(error: UserError, told: str) -> None:
+    async def work(session: Session) -> None:
+        async def draw(task: Any, *given: Any, **more: Any) -> Any:
+            if task.__name__ == "draw_pieces":
+                raise error
+            return ()
+
+        session.quick.run = draw  # type: ignore[method-assign]
+        session.do("cut", replace(session.bench, cuts=(PlannedPart(UP, 5.0),)))
+        with suppress(UserError):
+            assert (await session.pieces.get()).read_bytes() == b""
+        refused.append(session.problem)
+
+    refused: list[str] = []
+    when_done(work)
+    assert refused == [told]
 
 
 def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is_done() -> None:

@@ -173,6 +173,13 @@ def test_where_other_planes_are_refused_no_place_helps() -> None:
     assert trials(tee()).nearest((Plane(np.array([0.0, 0.0, 1.0]), 30.0), outside), 2) is None
 
 
+def test_a_plane_set_aside_above_which_the_whole_model_lies_leaves_it_for_the_planes_before_it() -> None:
+    below = Plane(UP, -5.0)
+    tried = trials(tee())
+    tried.set_aside([below])
+    assert tried.attempt((Plane(UP, 20.0), below)).rejected == ""
+
+
 def test_a_plane_set_aside_is_cut_all_the_same_so_that_the_planes_after_it_are_tried_on_what_it_leaves() -> None:
     plane, higher = Plane(UP, 20.0), Plane(UP, 27.0)
     kept = Trials(tee(), PROFILE, Zones(keep=(Zone((-2.0, -2.0, 26.0), (2.0, 2.0, 28.0)),)))

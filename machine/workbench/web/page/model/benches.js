@@ -96,7 +96,7 @@ export async function offer(what) {
 function offerRow(what, { key, name = "", bytes, parts, written_s: written }) {
   const act = (method) => () => fetch(`${what}/${key}`, { method }).then(() => offer(what), () => {});
   const title = name || "cannot be read here", size = bytes ? `${Math.ceil(bytes / 1000).toLocaleString("en")} kB` : parts ? partsInWords(parts) : "uncut", words = `${size}, ${moment(written)}`;
-  const picture = what === "kept" ? [made("img", { alt: "", loading: "lazy", src: `kept/${key}/picture` })] : [], open = button("", act("POST"), {}, ...picture, made("span", { text: title }), made("small", { text: words }));
+  const picture = what === "kept" ? [made("img", { alt: "", loading: "lazy", onerror: ({ target }) => target.remove(), src: `kept/${key}/picture` })] : [], open = button("", act("POST"), {}, ...picture, made("span", { text: title }), made("small", { text: words }));
   return made("li", {}, open, removeButton(`Remove ${title}, ${words}`, act("DELETE")));
 }
 

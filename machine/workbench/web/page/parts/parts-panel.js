@@ -51,8 +51,8 @@ export function partsPanel() {
   });
 }
 
-const marksUnder = (front, best) => $("front-marks").replaceChildren(...front.map((row) => made("span", {}, button(row.parts === best ? `${row.parts} ✓` : row.parts, () => send({ do: "take", parts: row.parts }), {
-  className: row.parts === best ? "recommended" : "", title: [partsInWords(row.parts), row.parts === best && "recommended", besideOne(row)].filter(Boolean).join(", "),
+const marksUnder = (front, best) => putNew($("front-marks"), [front, best], () => front.map((row) => made("span", {}, button(row.parts === best ? `${row.parts} ✓` : row.parts, () => send({ do: "take", parts: row.parts }), {
+  name: `take-${row.parts}`, className: row.parts === best ? "recommended" : "", title: [partsInWords(row.parts), row.parts === best && "recommended", besideOne(row)].filter(Boolean).join(", "),
 }))));
 
 const RELATIVE = { support: "support_area_mm2", time: "time_s", plastic: "filament_mm" }; // what is told beside one piece, by the names of a row's values

@@ -37,10 +37,10 @@ export function settingsPanel() {
     return marked || LEVELS.indexOf(setting.level) <= LEVELS.indexOf(kept.now.level);
   };
   const list = () => {
-    const words = sought(), rows = settings.filter(shown).sort((a, b) => farFrom(a, words) - farFrom(b, words)), changed = settings.filter((setting) => setting.changed), open = changedOnly || words.length > 0, ofParts = store.state.part_settings.reduce((sum, { keys }) => sum + keys.length, 0);
+    const words = sought(), rows = settings.filter(shown).sort((a, b) => farFrom(a, words) - farFrom(b, words)), changed = settings.filter((setting) => setting.changed), open = changedOnly || words.length > 0, ofParts = store.state.part_settings.reduce((sum, { keys }) => sum + keys.length, 0), helped = words.some((word) => word.startsWith("modif"));
     if (changedOnly && !changed.length) return showChanged(false);
-    tell({ "settings-count": rows.length ? `${rows.length} of ${settings.length} settings` : "No setting matches.", "only-changed": `${changed.length} changed${part() || !ofParts ? "" : `, ${ofParts} of parts`}` });
-    hide({ "modifier-help": !words.some((word) => word.startsWith("modif")) });
+    tell({ "settings-count": rows.length ? `${rows.length} of ${settings.length} settings` : helped ? "" : "No setting matches.", "only-changed": `${changed.length} changed${part() || !ofParts ? "" : `, ${ofParts} of parts`}` });
+    hide({ "modifier-help": !helped });
     disable({ "only-changed": !changed.length, "reset-settings": !changed.length });
     tellTakeBack(changed, part());
     for (const level of LEVELS) pressed(`level-${level}`, kept.now.level === level);
