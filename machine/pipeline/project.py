@@ -369,7 +369,7 @@ def _toml(file: Path) -> dict[str, Any]:
 
 def figures_of(row: FrontRow | None) -> dict[str, float]:
     """The known figures of a decomposition."""
-    names = ("time_s", "filament_mm", "support_area_mm2", "seam_mm", "cost_mm2", "total_mm2")
+    names = ("time_s", "filament_mm", "support_area_mm2", "seam_mm", "cost_mm2")
     return {name: value for name in names if (value := getattr(row, name, None)) is not None}
 
 
