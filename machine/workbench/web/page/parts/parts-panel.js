@@ -75,7 +75,7 @@ function tellRow(row) {
   $("front").setAttribute("aria-valuetext", partsInWords(row.parts) + (best ? ", recommended" : ""));
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [
-    ["parts", `${row.parts}${byHand ? ", changed by hand since" : row.why && (best || !row.chosen) ? ` (${best ? "recommended" : "only on request"}: ${row.why})` : ""}`],
+    ["parts", `${row.parts}${byHand ? ", changed by hand since" : row.why && (best || !row.chosen) ? ` (${best ? "recommended " : "only on request: "}${row.why})` : ""}`],
     ...[besideOne(byHand ? own : row)].filter(Boolean).map((text) => ["against 1 part", text]),
     ...figures.map(([name, value, unit]) => [name, value ? `${value} ${unit}`.trimEnd() : unknown]),
   ]);
