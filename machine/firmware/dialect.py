@@ -71,6 +71,7 @@ class Dialect:
     acceleration: str = ""  # {} of strokes, {} of travels, mm/s2
     pressure_advance: str = ""  # {} of the extruder, s
     babystep: str = ""  # {} mm up in machine Z during a print, coordinates as before: along the tool, whatever the table's pose
+    babystep_homed: bool = False  # only after Z was homed; ignored before
     pause: str = "M0"  # waits for the user
     filament_change: str = "M0"  # as pause, with the firmware's actions for a filament change
     layer: str = ""  # {} layer of all layers, from 1

@@ -52,6 +52,7 @@ DIALECT = Dialect(
     acceleration="M204 P{} T{}",
     pressure_advance="M900 K{}",
     babystep="M290 Z{}",
+    babystep_homed=True,  # BABYSTEP_WITHOUT_HOMING is off by default
     filament_change="M600",
     parts="M486 T{parts}",
     part_begin="M486 S{index}",

@@ -68,6 +68,7 @@ class Feed:
         self.state, self._trouble, self.started, self.finished = PrintState.PRINTING, "", False, False
         self.sent = self._skipped = 0
         self._program_pause = ""  # the program's text about the pause before its next command
+        self._shifts_z = True
         self._barriers, self._reconnected = Barriers(self.modal.axes.letters, start_s), False
         self._pause: Pause | None = None  # the current one
         self._start_s = self._shown_s = self._asked_s = start_s
@@ -76,8 +77,8 @@ class Feed:
     def run(self, lines: Iterable[str], resume_point: ResumePoint | None = None) -> None:
         """Feed the program from its beginning, or from the resume point of an interrupted print, to the final barrier."""
         exchange = self.exchange
-        shifts_z = resume_point is None or resume_point.shifts_z
-        if not (shifts_z and exchange.connection.greeting.capabilities.get("BABYSTEPPING", True)):
+        self._shifts_z = resume_point is None or resume_point.shifts_z
+        if not (self._shifts_z and exchange.connection.greeting.capabilities.get("BABYSTEPPING", True)):
             self.pending.babystep = ""
         if resume_point is not None and resume_point.z_offset_mm and not self.pending.babystep:
             offset = f"{resume_point.z_offset_mm:+g} mm"
@@ -338,8 +339,9 @@ class Feed:
         number = self.exchange.connection.window.wire_number(history.number)
         # while heating again or without a port the tip still waits
         state = PrintState.DONE if self.finished else PrintState.PAUSED if waits is not None else self.state
-        z_offset_mm = round(self.pending.sent_offset_mm, 3)
-        return Checkpoint(history.sent, history.acknowledged, history.executed, number, waits or history.pose, state, z_offset_mm)
+        z_offset_mm, shifts_z = round(self.pending.sent_offset_mm, 3), self._shifts_z
+        lines = history.sent, history.acknowledged, history.executed, number
+        return Checkpoint(*lines, waits or history.pose, state, z_offset_mm, shifts_z)
 
     def _record(self, hurry: bool = False) -> None:
         if self._journal is not None:

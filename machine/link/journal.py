@@ -73,6 +73,7 @@ class Checkpoint:
     pose: tuple[float | None, ...] = ()
     state: PrintState = PrintState.PRINTING
     z_offset_mm: float = 0.0  # of the user, as sent to the firmware
+    shifts_z: bool = True  # whether the firmware can change it
     continued_in: str | None = None  # the journal of the run that resumed the print
 
 
@@ -298,8 +299,9 @@ def _slot(number: int, checkpoint: Checkpoint) -> bytes:
     lines = [checkpoint.sent, checkpoint.acknowledged, checkpoint.executed, checkpoint.number]
     state, rest = checkpoint.state, checkpoint.continued_in
     word = WORDS.get(state, state) if rest is None else f"{RESUMED}{rest}"
-    offset = (checkpoint.z_offset_mm,) if checkpoint.z_offset_mm else ()  # earlier versions know none, and refuse such a record
-    return _record([number, *lines, checkpoint.pose, word, *offset])
+    # Earlier versions know no Z offset, and refuse such a record.
+    offset = (checkpoint.z_offset_mm,) if checkpoint.z_offset_mm or not checkpoint.shifts_z else ()
+    return _record([number, *lines, checkpoint.pose, word, *offset, *(() if checkpoint.shifts_z else (0,))])
 
 
 def read_journal(path: Path) -> JournalContents:
@@ -373,7 +375,8 @@ def _checkpoint(path: Path, value: Any, slot: int) -> tuple[int, Checkpoint]:
         case [int(number), int(sent), int(acknowledged), int(executed), int(wire), list(pose), str(word), *offset] if _is_pose(
             pose
         ) and _is_offset(offset):
-            at = Checkpoint(sent, acknowledged, executed, wire, tuple(pose), z_offset_mm=sum(offset))
+            z_offset_mm = offset[0] if offset else 0.0
+            at = Checkpoint(sent, acknowledged, executed, wire, tuple(pose), z_offset_mm=z_offset_mm, shifts_z=len(offset) < 2)
             if word.startswith(RESUMED):
                 return number, replace(at, continued_in=word.removeprefix(RESUMED))
             if word in STATES:
@@ -386,8 +389,8 @@ def _is_pose(values: list[Any]) -> bool:
 
 
 def _is_offset(values: list[Any]) -> bool:
-    """Whether the end of a record is a Z offset, or absent."""
-    return len(values) <= 1 and None not in values and _is_pose(values)
+    """Whether the end of a record is a Z offset, one with a 0 because the firmware cannot change it, or absent."""
+    return len(values) <= 2 and None not in values and _is_pose(values) and values[1:] in ([], [0])
 
 
 def write_at(descriptor: int, offset: int, data: bytes) -> None:

@@ -144,7 +144,7 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
         line, modal = standing
         before = (*heat_commands(modal, profile), *modal.lines())
         reason = f"the printer stands where this line begins: nothing is repeated{_offset_in_words(offset_mm)}"
-        return ResumePoint(line + 1, before, reason, z_offset_mm=offset_mm)
+        return ResumePoint(line + 1, before, reason, z_offset_mm=offset_mm, shifts_z=point.checkpoint.shifts_z)
     if not point.stroked:
         # homing resets the offset in most firmwares
         held_mm = offset_mm if babystep.endswith(KEEPS_OFFSET) and not (begun or status.greeted) else 0.0
@@ -155,7 +155,8 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     at = _reported_position(point, status) if alive or (alive is None and not begun) else None
     if at is not None and not status.greeted:
         reason = f"the printer has not restarted and knows its place; {span}{_offset_in_words(offset_mm)}"
-        return ResumePoint(point.line, _approach(point, profile, *at), reason, z_offset_mm=offset_mm)
+        before = _approach(point, profile, *at)
+        return ResumePoint(point.line, before, reason, z_offset_mm=offset_mm, shifts_z=point.checkpoint.shifts_z)
     if not status.greeted:
         _check_begun(status, begun)
     before = _approach(point, profile, *position_at_interruption(point, profile), homes=True)
@@ -163,7 +164,8 @@ def plan_resume(point: InterruptedPrint, status: PrinterStatus, profile: Profile
     words = f"; its Z offset of {offset_mm:+g} mm is {'set again' if again else 'kept'}" if offset_mm else ""
     held_mm = offset_mm if again else 0.0  # else the axis itself has it
     reason = f"the printer has restarted; {span}{words}"
-    return ResumePoint(point.line, before, reason, homes=True, z_offset_mm=held_mm, shifts_z=again)
+    shifts_z = again or not dialect_of(profile.machine).babystep_homed
+    return ResumePoint(point.line, before, reason, homes=True, z_offset_mm=held_mm, shifts_z=shifts_z)
 
 
 def _offset_in_words(offset_mm: float) -> str:

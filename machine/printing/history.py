@@ -82,7 +82,8 @@ def _new_file() -> BinaryIO:
     while not lock(file.fileno()):  # another process is reading it
         if monotonic() > until_s:
             file.close()
-            Path(file.name).unlink()
+            with suppress(OSError):
+                Path(file.name).unlink()
             raise OutputError(f"{file.name} cannot be locked")
         sleep(0.01)
     return file

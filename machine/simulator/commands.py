@@ -309,9 +309,9 @@ def _override_flow(board: Board, order: Order) -> Work:
 
 def _babystep(board: Board, order: Order) -> Work:
     """M290, SET_GCODE_OFFSET: the axis Z moves, at once or with the next move; the coordinate as the firmware knows it stays.
-    Marlin answers M290 but ignores it until Z is homed (BABYSTEP_WITHOUT_HOMING is off by default)."""
+    Marlin answers M290 but ignores it until Z is homed."""
     named = order.name == "M290"
-    if named and 2 not in board.motion.homed:
+    if dialect_of(board.machine).babystep_homed and 2 not in board.motion.homed:
         return None
     board.motion.shift_z(order.words.get("Z", 0.0) if named else float(order.values.get("Z_ADJUST", 0.0)))
     if named or order.values.get("MOVE") == "1":

@@ -326,7 +326,7 @@ def _complete(problem: Problem, node: Node, planned: PlannedPart, label: str) ->
     direction = np.nonzero(wanted)[0]
     missing = "normal" if planned.normal is None else "offset_mm"
     if len(direction) == 0:
-        raise PlanError(f"{label}: no {missing} can be found for it, every such plane misses what is left of the model")
+        raise PlanError(f"{label}: no {missing} can be found for it, no such plane cuts what is left of the model")
     offset_mm, gains_mm2 = swept.offsets_mm(step_mm)[wanted], gain_mm2(swept, residual_mm2(swept, problem.terms))[wanted]
     reason = check(node.remainder, limits, step_mm, direction.astype(np.int32), offset_mm).reason
     for row in np.lexsort((offset_mm, -directions[direction, 2], -np.round(gains_mm2 / EQUAL_MM2))):

@@ -14,7 +14,7 @@ from mdp.decomposition import Decomposition, FrontRow
 from mdp.mesh import Mesh
 from mdp.ranking.node import Node
 from mdp.search.by_hand import cut_near
-from mdp.search.front import Pricing, front_row, with_price
+from mdp.search.front import Pricing, Weights, front_row, with_price
 from mdp.search.parts import decomposition_of, make_parts, notes_of_search
 from mdp.search.polish import refine_planes
 from mdp.search.problem import Problem
@@ -68,6 +68,8 @@ def cut_as_copy(problem: Problem, copy: Decomposition, price: Pricing | None) ->
         rows[place] = with_price(rows[place], price(parts))
     if place > 0 and len(rows[0].planes) == len(start.cuts):
         rows[0] = _measured(rows[0], start)
+    for changed in {0, place}:
+        rows[changed] = _with_total(rows[changed], copy.front[changed], Weights.of(problem.profile))
     searched_s = copy.search_s + perf_counter() - began
     fine = decomposition_of(problem, copy.name, parts, rows, notes_of_search(copy))
     evaluated = copy.candidates_evaluated
@@ -77,4 +79,12 @@ def cut_as_copy(problem: Problem, copy: Decomposition, price: Pricing | None) ->
 def _measured(row: FrontRow, node: Node) -> FrontRow:
     """A row with the planes and costs of a node; its time stays."""
     costs = front_row(node)
-    return replace(costs, chosen=row.chosen, reason=row.reason, time_s=row.time_s, filament_mm=row.filament_mm)
+    return replace(costs, chosen=row.chosen, reason=row.reason, time_s=row.time_s, filament_mm=row.filament_mm, flaw=row.flaw)
+
+
+def _with_total(row: FrontRow, before: FrontRow, weights: Weights) -> FrontRow:
+    """A measured row with its total, which differs from that before by cost, time and filament."""
+    if before.total_mm2 is None:
+        return row
+    dearer_mm2 = row.cost_mm2 - before.cost_mm2 + (weights.of_row(row) or 0.0) - (weights.of_row(before) or 0.0)
+    return replace(row, total_mm2=before.total_mm2 + dearer_mm2)

@@ -71,4 +71,4 @@ def test_a_file_that_does_not_tell_its_machine_is_tried_for_that_of_the_settings
     with workbench(*QUICK) as running, running.line() as page:
         running.send(tmp_path / "box.gcode")
         page.until(lambda state: state["gcode"])
-        assert "it does not tell its machine, so it was tried for generic A/C table as" in page.state["gcode"]["told"]
+        assert "the file does not name its machine, so it was tried for generic A/C table as" in page.state["gcode"]["told"]

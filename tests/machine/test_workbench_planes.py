@@ -62,7 +62,7 @@ def test_a_plane_snaps_to_the_neck_nearby_and_where_there_is_none_that_is_told(b
         page.do("neck", part=2)
         problem = page.until(lambda state: state["problem"])["problem"]
         where = "within 10 mm and 25 degrees no section is narrower than its surroundings"
-        assert problem == f"there is no narrowest section near the plane of part 2: {where}"
+        assert problem == f"there is no narrower section near the plane of part 2: {where}"
 
 
 def test_marks_are_in_the_plan_of_the_command_line_and_planes_that_they_forbid_are_invalid(bench: Running, folder: Path) -> None:

@@ -55,7 +55,7 @@ def _lan(request: EditRequest) -> Lan | None:
     if request.lan:
         return open_lan(request.certificate, request.key)
     if request.certificate or request.key:
-        raise OutputError("--certificate and --key encrypt what --lan opens: give --lan, too")
+        raise OutputError("--certificate and --key need --lan: add it")
     return None
 
 

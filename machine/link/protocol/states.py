@@ -37,7 +37,7 @@ class Signal(Enum):
     SILENT = "probes or handshakes remain without answer"
     START = "the printer started anew"
     FAULT = "the firmware reported an error"
-    UNCHECKED = "what became of a line cannot be known: a torn one was run, or one without answer cannot be asked about"
+    UNCHECKED = "whether a line was executed cannot be known: a damaged one was run, or one without answer cannot be queried"
     RECONNECTED = "the port was lost and is there again: what was on its way may have got lost"
     LAST_NUMBER = "the last line number was used, and no line is in flight"
 

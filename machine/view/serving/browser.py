@@ -46,7 +46,7 @@ def lead_browser(address: str, until_end: ExitStack) -> None:
     try:
         file = until_end.enter_context(redirecting(address))
     except OSError as error:
-        say(f"no browser is opened, for no file can be written that leads it: {error.strerror}; open the address in one")
+        say(f"no browser is opened, because its redirect file cannot be written: {error.strerror}; open the address yourself")
         return
     Thread(target=_show_in_browser, args=(file.as_uri(),), name="browser", daemon=True).start()
 

@@ -162,7 +162,7 @@ class Door(Observable):
                 f"{before.wrong + 1} wrong codes were typed: for {self.wait_s:.0f} s none is taken, then a new one: {self._code}"
             )
         elif verdict == Verdict.CLOSED and not before.closed:
-            wrong = f"{self.pairing.wrong_in_all} wrong codes were typed: no device is paired any more"
+            wrong = f"{self.pairing.wrong_in_all} wrong codes were typed: no further device can be paired"
             self._say(f"{wrong} until the page on this computer lets them, or tiltprint edit is started again")
         if self.pairing != before:
             self.notify()
@@ -236,7 +236,7 @@ def pairing_page(door: Door, verdict: Verdict | None = None) -> HTMLResponse:
 def _told(door: Door, verdict: Verdict | None) -> str:
     """Sentence on why this device cannot be paired, or ""."""
     if door.pairing.closed:
-        return "Too many wrong codes were typed: no device is paired any more. The page on the computer can let them again."
+        return "Too many wrong codes were typed: no further device can be paired. The page on the computer can allow it again."
     if door.wait_s:
         return f"Too many wrong codes were typed. Wait {door.wait_s:.0f} seconds; the terminal shows a new code."
     return "This is not the code that the terminal shows now." if verdict == Verdict.WRONG else ""

@@ -158,7 +158,7 @@ def check_level(machine: Machine, at: dict[str, float], *, homing: bool) -> None
         return
     tilt = at.get(machine.tilt.letter)
     if tilt is None:
-        raise MoveError("the printer does not tell how the table stands, so nothing is moved: level it at the machine")
+        raise MoveError("the printer does not report the table's position, so nothing is moved: level it at the machine")
     if abs(tilt - machine.tilt.zero_deg) > LEVEL_DEG:
         raise MoveError(f"the table is tilted, at {machine.tilt.letter}{tilt:.2f}: nothing is homed or moved before it is level")
 

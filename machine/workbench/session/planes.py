@@ -213,7 +213,7 @@ class PlaneTrials:
             neck = await self._readiness.ask(near_neck, bench, bench.cuts, part, reach_mm, tuple(self.invalid))
         if neck is None:
             where = f"within {reach_mm:.0f} mm and {REACH_DEG:g} degrees no section is narrower than its surroundings"
-            raise PlanError(f"there is no narrowest section near the plane of part {part}: {where}")
+            raise PlanError(f"there is no narrower section near the plane of part {part}: {where}")
         normal, offset_mm = vector_of(neck.normal), float(neck.offset_mm)
         nearer = {"do": "move", "part": part, "normal": list(normal), "offset_mm": offset_mm, "near": True}
         await self.take(snap(bench, part, PlannedPart(normal, offset_mm)), nearer)

@@ -95,7 +95,7 @@ async def _hear(socket: WebSocket, page: PageOfPrints) -> None:
                 with_bench = obey(page, asked)
                 if with_bench is not None and ordering is not None and not ordering.done():
                     with_bench.close()
-                    raise PrinterError("what this page has ordered last still waits for its bench: wait for that first")
+                    raise PrinterError("the previous command of this page still waits for its bench: wait for that first")
                 if with_bench is not None:
                     ordering = tasks.create_task(_order(socket, with_bench))
 

@@ -246,7 +246,7 @@ def _plate_state(session: Session) -> dict[str, Any]:
         told = f"Looking for places for all {count} on the plate …"
     else:
         told = (
-            f"{plated.problem}. Until then they are drawn in red beside the plate."
+            f"{plated.problem}. The models without a place are drawn in red."
             if plated.problem
             else f"All {count} stand on the plate."
         )

@@ -133,6 +133,9 @@ def measure_plan(tell: Tell, bench: Bench, plan: PlanFile, recommended: int = 0)
     if found and plan.parts not in found.values():
         cut_bench(bench, replace(plan, front=()))
         plan = replace(plan, parts=found.get(recommended, next(iter(found.values()))))
+        with suppress(CutError):  # a row of a coarse copy may not cut the model itself
+            return cut_bench(bench, plan, prices=True).front
+        plan = replace(plan, parts=next(iter(found.values())))
     return cut_bench(bench, plan, prices=True).front
 
 

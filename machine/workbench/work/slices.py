@@ -148,7 +148,7 @@ def open_gcode(tell: Tell, request: ModelRequest, page: Path, gcode: Path) -> Sl
     content = ("\n".join(program.lines) + "\n").encode("utf-8", "replace")
     page.write_bytes(drawn)
     gcode.write_bytes(content)
-    values, note = summary(program.run), "" if loaded.machine_known else "it does not tell its machine"
+    values, note = summary(program.run), "" if loaded.machine_known else "the file does not name its machine"
     return Sliced(
         page,
         gcode,

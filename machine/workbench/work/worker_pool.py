@@ -18,7 +18,7 @@ from machine.crash import bug_in_words
 from mdp.kernels.workers import CallError, KilledError, Tell, Worker, tell
 from profiles.errors import CutError, UserError
 
-CLOSED = "this bench is closed: nothing is worked out for it any more"
+CLOSED = "this bench is closed: nothing is computed for it any longer"
 REST_AFTER_S = 300.0  # idle time after which a process ends: each holds some 200 MB
 Value = TypeVar("Value")
 TASKS = "cutting", "models", "plate", "slices"  # modules of this room with tasks

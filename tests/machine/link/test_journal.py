@@ -206,6 +206,13 @@ def test_a_record_without_a_z_offset_reads_as_one_of_0_mm(tmp_path: Path) -> Non
     assert b'"printing"]' in (tmp_path / "0").read_bytes()  # the record of earlier versions
 
 
+def test_a_record_says_that_the_firmware_cannot_change_the_z_offset(tmp_path: Path) -> None:
+    path = written(tmp_path / "j", [at(4), replace(at(5), z_offset_mm=0.1, shifts_z=False)])
+    assert (read_journal(path).last.z_offset_mm, read_journal(path).last.shifts_z) == (0.1, False)
+    path = written(tmp_path / "k", [at(4), replace(at(5), shifts_z=False)])
+    assert (read_journal(path).last.z_offset_mm, read_journal(path).last.shifts_z) == (0.0, False)
+
+
 def test_a_record_with_a_state_that_no_print_has_is_damage(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", HEADING) as journal:
         journal.write(replace(at(20), state="dancing"))  # type: ignore[arg-type]

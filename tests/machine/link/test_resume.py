@@ -281,6 +281,21 @@ def test_after_such_a_restart_a_further_z_offset_is_refused_as_marlin_would_igno
     assert heights_of_strokes(printer) == {63.1, 63.3}
 
 
+def test_a_host_that_dies_after_such_a_restart_still_knows_that_marlin_ignores_a_z_offset(text: GcodeFile) -> None:
+    printer = VirtualPrinter(PROFILE.machine)
+    story = shifted_then_killed(text, printer)
+    printer.firmware.reset()
+    medium = replace(printer.medium, open=lambda name, baud: _Mortal(printer.medium.open(name, baud), 40))
+    with journal_of(text, "second") as journal, pytest.raises(KilledError):
+        print_lines(
+            text, PATH, medium=medium, profile=PROFILE, journal=journal,
+            begin=lambda seen: plan_resume(cut_off(text, story.last), seen, PROFILE),
+        )  # fmt: skip
+    again = read_journal(journal.path)
+    way, _ = resumed(text, printer, again)
+    assert (again.last.shifts_z, way.shifts_z, way.homes) == (False, False, False)
+
+
 @pytest.mark.parametrize(("block", "homes"), [
     ("", False), ("G28 X Y", False), ("; G28 Z", False), ("G28 Z F100\nG28 X Y", True), ("g28", True), ("G28 XZ ; all", True),
     ("G28 O", True), ("G28 R5", True), ("G28XYZ", True), ("G28 X0 Y0", False),

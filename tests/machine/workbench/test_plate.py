@@ -141,7 +141,7 @@ def test_a_model_opened_over_another_one_can_be_put_beside_it_instead(bench: Run
         page.do("beside", number=1, count=900)
         told = page.until(lambda state: state["copies_told"].startswith("box.stl measures 16.0 x 16.0 mm"))["copies_told"]
         assert "no room for it" in told
-        assert told.endswith(". Until then they are drawn in red beside the plate.")
+        assert told.endswith(". The models without a place are drawn in red.")
         assert (page.state["unsliceable"], page.state["is_sure"]) == (
             "",
             False,

@@ -164,7 +164,7 @@ def test_a_bench_gets_the_process_that_it_had_and_its_end_is_that_of_this_proces
         first.close()
         await started.gone(0)
         assert await rank(second) == pytest.approx(10.0)
-        with pytest.raises(UserError, match="this bench is closed: nothing is worked out for it any more"):
+        with pytest.raises(UserError, match="this bench is closed: nothing is computed for it any longer"):
             await rank(first)
 
     run(work(), pool)

@@ -237,7 +237,7 @@ def test_an_open_direction_is_found_for_its_offset() -> None:
 def test_a_plane_that_nothing_can_complete_says_why() -> None:
     with pytest.raises(PlanError, match=r"part 2: no offset_mm can be found for it among \d+: .*\d+ because "):
         decompose(shapes.box(z=8.0), "shape", _profile(), SearchRequest(plan=_by_hand(((0.98, 0.0, 0.2), None))))
-    with pytest.raises(PlanError, match="no normal can be found for it, every such plane misses what is left of the model"):
+    with pytest.raises(PlanError, match="no normal can be found for it, no such plane cuts what is left of the model"):
         decompose(shapes.box(), "shape", _profile(), SearchRequest(plan=_by_hand((None, 99999.0))))
     with pytest.raises(PlanError, match=r"part 2: offset_mm is 1e-05: 0 or at least 0.03125 is allowed"):
         decompose(shapes.box(), "shape", _profile(), SearchRequest(plan=_by_hand((None, 1e-5))))

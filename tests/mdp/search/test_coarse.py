@@ -13,6 +13,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.plane import Plane
 from mdp.search.by_hand import Rejection, cut_near, try_planes
 from mdp.search.coarse import coarse_copy
+from mdp.search.front import Weights
 from mdp.search.orient import orient_and_decompose
 from mdp.search.plan_file import PlanFile, PlannedPart
 from mdp.search.problem import Problem
@@ -131,6 +132,11 @@ def test_the_row_that_is_chosen_is_priced_by_the_parts_of_the_model_itself(fine:
     found = decompose(fine, "shape", _profile(2000), SearchRequest(parts=2, price=faces))
     assert found.chosen is not None
     assert found.chosen.time_s == sum(len(part.mesh.faces) for part in found.parts) > len(fine.faces)
+    first, weights = found.front[0], Weights.of(_profile(2000))
+    totals = [row.cost_mm2 + (weights.of_row(row) or 0.0) for row in (first, found.chosen)]
+    charge = found.chosen.total_mm2 - totals[1]  # type: ignore[operator]
+    assert first.total_mm2 == pytest.approx(totals[0])
+    assert charge == pytest.approx(load().search.least_saving * totals[0], rel=0.1)  # of the copy's first row
 
 
 def test_a_search_that_is_recorded_is_one_of_the_model_itself(fine: Mesh) -> None:

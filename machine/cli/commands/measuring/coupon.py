@@ -40,7 +40,7 @@ from profiles.profile import Profile, load, with_part_settings
 N_PER_KG = 9.80665
 INTRO = """{bars} bars of a {shape} coupon, printed on {machine}: at what load did each break?
 Newtons, or as a scale shows it: 9.2kg. The plate printed more than once: one load for each time, in one line.
-Enter keeps what stands in [ ], s skips a bar, b goes back, Ctrl-C ends and leaves all as it was.
+Enter keeps the value in [ ], s skips a bar, b goes back, Ctrl-C ends without changes.
 """
 UNSUPPORTED = ("process.support=none",)  # the bars need none, and it would stand on the joints to be measured
 

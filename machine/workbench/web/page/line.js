@@ -15,10 +15,10 @@ export const LINE_STATUS = {
   open: "",
   lost: "The line to tiltprint is lost; trying again.",
   silent: "tiltprint does not answer; waiting for it.",
-  ended: "tiltprint has ended. Start it again and open the address that it tells; if it was killed, the files dropped here can be opened there.",
-  replaced: "This page is of a tiltprint that has ended. Another one is here now: open the address that its terminal has told.",
-  unpaired: "This device is not paired any more: load this page again to pair it by another code.",
-  closed: "This bench was closed: its page may be closed, too, or loaded anew at the workbench's address.",
+  ended: "tiltprint has ended. Start it again and open the address in its terminal; if it was killed, the files dropped here can be opened there.",
+  replaced: "This page belongs to a tiltprint that has ended. Another one runs now: open the address in its terminal.",
+  unpaired: "This device is no longer paired: load this page again to pair it by another code.",
+  closed: "This bench was closed: close this page, or load it again at the workbench's address.",
 };
 
 /** A websocket below the page's address that reconnects by itself. heard(message); stands(a key of LINE_STATUS) at every change, "silent" while a path with beats receives none. */

@@ -153,12 +153,12 @@ def test_a_hundred_codes_at_once_pair_nobody_and_close_pairing_while_paired_devi
                 assert {answer.status_code for answer in answers} <= {403, 429}
                 network.now_s += 1000.0
                 assert (await phone.get("/paired/1/")).text == "the workbench, device 1"
-            assert "20 wrong codes were typed: no device is paired any more" in network.said[-1]
+            assert "20 wrong codes were typed: no further device can be paired" in network.said[-1]
             assert "the page on this computer" in network.said[-1]
             right = network.door.pairing.code
             assert (await pair(thief, right)).status_code == 403
             page = await thief.get("/")
-            assert "no device is paired any more" in page.text
+            assert "no further device can be paired" in page.text
             assert "<form" not in page.text
             assert len(network.door.devices) == 1
             network.door.reopen()

@@ -125,4 +125,4 @@ def test_other_files_are_told_in_one_sentence(
 
 def test_a_certificate_without_a_network_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["edit", "--certificate", "a.pem", "--key", "a.key"]) == 1
-    assert "--certificate and --key encrypt what --lan opens: give --lan, too" in capsys.readouterr().err
+    assert "--certificate and --key need --lan: add it" in capsys.readouterr().err

@@ -90,7 +90,7 @@ def test_nothing_is_homed_or_moved_over_a_table_that_is_tilted_or_of_which_nothi
     check_level(MACHINE, {"A": 0.0, "C": 90.0}, homing=False)
     with pytest.raises(MoveError, match=r"the table is tilted, at A30.00: nothing is homed or moved before it is level"):
         check_level(MACHINE, {"A": 30.0, "C": 0.0}, homing=True)
-    with pytest.raises(MoveError, match="does not tell how the table stands"):
+    with pytest.raises(MoveError, match="does not report the table's position"):
         check_level(MACHINE, {"X": 0.0}, homing=True)
     check_level(load(machine="three_axis").machine, {"X": 0.0}, homing=False)
     switched_on = dict(zip("XYZAC", MACHINE.home, strict=True))
