@@ -44,7 +44,7 @@ def _findings(program: ParsedProgram, rows: Indices, stopped: NDArray[np.bool_],
         needed = 1.0 / max(float(np.median(times_s[mine])), TINY)
         stops = int(stopped[mine].sum())
         message = (
-            f"{baud} baud: {len(mine)} moves arrive late, {needed:.0f} lines/s are needed there: the printer slows down"
+            f"at {baud} baud {len(mine)} moves arrive late, {needed:.0f} lines/s are needed there: the printer slows down"
             f"{f' and stops {stops} times' if stops else ''}; a faster line or longer segments help"
         )
         yield at_row(program, int(mine[0]), "warning", "starvation", message)

@@ -54,7 +54,7 @@ def test_scenario_35_starvation_is_predicted_with_part_layer_line_and_count() ->
     (found,) = (f for f in find_starvation(dry_run(lines, PROFILE), lines, MACHINE, 115200).findings if f.code == "starvation")
     assert (found.severity, found.part, found.layer) == ("warning", 1, 1)
     assert lines[found.line - 1].startswith("G1 X")
-    assert "115200 baud bring" in found.message
+    assert "at 115200 baud" in found.message
     assert "600 lines/s are needed" in found.message
 
 
@@ -87,7 +87,7 @@ def test_print_looks_at_the_line_s_speed_where_the_baud_rate_means_something(por
 def test_simulate_takes_a_baud_rate(tmp_path, capsys: pytest.CaptureFixture[str]) -> None:  # type: ignore[no-untyped-def]
     (tmp_path / "a.gcode").write_text("\n".join(circles(0.1, 3600, 400)))
     main(["simulate", str(tmp_path / "a.gcode"), "--baud", "115200"])
-    assert "warning: 115200 baud bring" in capsys.readouterr().out
+    assert "warning: at 115200 baud" in capsys.readouterr().out
     assert main(["simulate", str(tmp_path / "a.gcode"), "--baud", "12"]) == 1
     assert (
         capsys.readouterr().err
