@@ -444,7 +444,7 @@ def test_the_picture_keeps_its_width_when_the_report_is_opened(page: Browser) ->
     before = page.value(width)
     page.click("#tab-report")
     assert page.value(width) == before
-    assert page.value("[...document.querySelectorAll('#report .table')].every((table) => table.tabIndex === 0)")  # the table may scroll
+    assert page.value("[...document.querySelectorAll('#report .table')].every((table) => table.tabIndex === 0)")  # may scroll
 
 
 def test_the_report_holds_every_part_and_is_printed_with_the_picture(page: Browser) -> None:

@@ -98,7 +98,7 @@ def test_every_control_of_the_page_of_a_print_has_a_name(browser: Browser, tmp_p
 
 
 def check_names(browser: Browser, at_least: int) -> None:
-    """At least this number of controls exist, all have names, and no element without a role has one, which would not be read out."""
+    """At least this number of controls exist, all have names, and no element without a role has a name that is never read out."""
     browser.value(
         "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
     )  # elements drawn now have names

@@ -250,7 +250,7 @@ def test_the_face_that_is_clicked_lies_on_the_platform(browser: Browser, bench: 
     browser.click("#fit")
     browser.click("#lay")
     browser.wait("$('rings').hasAttribute('hidden')")  # one of the rings crosses the middle
-    browser.wait("modules['page/store'].store.facets?.facets.length === 6")  # of the hull of a T; none on the undersides of its arms
+    browser.wait("modules['page/store'].store.facets?.facets.length === 6")  # of the hull of a T; none below its arms
     browser.press(*browser.middle("#canvas"))
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: lay a face down'")
     assert area(browser) == 0.0  # upside down a T needs no support

@@ -40,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def key() -> Iterator[None]:
-    """Save the key of the print server's stand-in for the workbench and the command line."""
+    """The key of the print server's stand-in, in the environment of the workbench and the command line."""
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv(VARIABLE, KEY)
         yield
@@ -157,7 +157,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.wait(f"{PRINTING} === 'paused'")
         second_page.do("check", port="/dev/none")
         browser.wait("$('which').options.length === 2")
-        assert browser.value(PRINTING) == "paused"  # neither the print that is shown nor the one that the button stops has changed
+        assert browser.value(PRINTING) == "paused"  # neither the print shown nor the one that the button stops has changed
         second_page.until(lambda seen: seen["is_over"])
         second_page.command("forget")
         second_page.until(lambda seen: seen["state"] == "paused")

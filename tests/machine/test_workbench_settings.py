@@ -1,4 +1,4 @@
-"""Settings on the workbench in a real browser: for all parts and for one, refused beside their field, and their effect on a front."""
+"""Settings on the workbench in a real browser: for all parts and for one, refused beside their field, and used by a front."""
 
 import json
 import shlex

@@ -22,7 +22,7 @@ TURN_S = 1e-4  # duration of a turn of the host: time passes even if an answer i
 PATH = "virtual"
 LINE_BYTES = 36  # of a stroke on the wire, so that byte faults hit the lines
 MOST_S = 3.0  # maximum duration of random delays and stalls
-HEALED: tuple[Kind, ...] = (*BYTE_KINDS[:3], *OK_KINDS, "spurious resend")  # faults that a sender can recover from without stopping
+HEALED: tuple[Kind, ...] = (*BYTE_KINDS[:3], *OK_KINDS, "spurious resend")  # a sender recovers from these without stopping
 
 
 class EndlessError(Exception):

@@ -1,4 +1,4 @@
-"""A print whose disk fails, from `print` to `resume`: it is reported at once and at the end, then refused or resumed at the cut."""
+"""A print whose disk fails, from `print` to `resume`: reported at once and at the end, then refused or resumed at the cut."""
 
 import errno
 import shutil

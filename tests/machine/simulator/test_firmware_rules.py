@@ -105,7 +105,7 @@ def test_the_terminal_s_back_pressure_reaches_the_host() -> None:
 
 
 def test_klipper_sees_m112_out_of_order_and_tells_the_reason_to_what_waits_behind_it() -> None:
-    """klippy/gcode.py: _process_data searches for M112 before it processes lines; _respond_state, then _respond_error for the next."""
+    """klippy/gcode.py: _process_data searches for M112 before it processes; _respond_state, then _respond_error for the next."""
     firmware = SimulatedFirmware(KLIPPER)
     answer(firmware, "G4 S50\nG1 X5\n", until_s=1.0)
     said = answer(firmware, "M112\n", until_s=1.0)
