@@ -397,7 +397,7 @@ def test_print_under_the_verdict_checks_at_the_printer_of_last_time_and_moves_an
         browser.click("#tab-slices")
         browser.wait("$('verdict-print').checkVisibility() && $('port-typed').value")
         browser.click("#look")
-        browser.click("#bar-print")  # the same as the button under the verdict
+        browser.click("#bar-print")  # also offered under the verdict
         browser.wait(f"{PRINTING} === 'ready' && $('begin').checkVisibility()")
         assert browser.value("$('port-typed').value") == printer.path
         assert (printer.record.events, printer.record.moves) == ((), 0)

@@ -7,7 +7,7 @@ from machine.simulator.contact import ProbedTable
 
 
 class FaultyTable(ProbedTable):
-    """silent_from, early_from: number of the first probing move, from 1, at which the probe no longer triggers, or triggers at once."""
+    """The probe fails to trigger from probing move number `silent_from`, and triggers at once from `early_from`; counted from 1."""
 
     def __init__(self, *what: Any, silent_from: float = inf, early_from: float = inf, **more: Any) -> None:
         super().__init__(*what, **more)

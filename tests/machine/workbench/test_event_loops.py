@@ -62,7 +62,7 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(benches: Loop, monke
         hanging = asyncio.create_task(in_loop(benches, hang()))
         while not hangs.is_set():
             await asyncio.sleep(0.01)
-        for command in ('{"do": "check", "port": "sim"}', '{"do": "emergency"}'):  # the first waits for the bench, which is blocked
+        for command in ('{"do": "check", "port": "sim"}', '{"do": "emergency"}'):  # the first waits for the bench, which hangs
             said.put_nowait({"type": "websocket.receive", "text": command})
         stopped = await hanging
         said.put_nowait({"type": "websocket.disconnect", "code": 1001})

@@ -349,7 +349,7 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
         problem = page.until(lambda state: state["problem"])["problem"]
         assert problem.startswith("large.stl: has more than the 1 MiB that a page may send:")
         assert [bench.send(sent / name)[0] for name in (broken, "tee.stl", "plan.toml")] == [422, 200, 422]
-        assert json.loads(bench.send(sent / broken)[1])["problem"].startswith(f"{broken} is ")  # a file name is not treated as words of the page
+        assert json.loads(bench.send(sent / broken)[1])["problem"].startswith(f"{broken} is ")  # not in words of the page
         assert [names_in(folder) for folder in temporary.glob("tiltprint-edit-*") if names_in(folder)] == [["tee.stl"]]
     assert list(temporary.glob("tiltprint-edit-*")) == []
 

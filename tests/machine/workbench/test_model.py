@@ -1,4 +1,4 @@
-"""A model: its mesh file has the content that was read, is not sent through a pipe, and exists while the model is used; its pose."""
+"""A model: its mesh file holds what was read, is not sent through a pipe, and exists while the model is used; its pose."""
 
 import asyncio
 import gc
@@ -240,7 +240,7 @@ def test_on_a_pedestal_the_feet_stand_and_its_triangles_are_those_of_a_body_of_i
     points, faces = np.frombuffer(stood.pedestal, "<u4", 2)
     places = np.frombuffer(stood.pedestal, "<f8", 3 * points, 8).reshape(-1, 3)
     assert len(stood.pedestal) == 8 + 24 * points + 12 * faces
-    assert np.ptp(places, axis=0) == pytest.approx((14.0, 14.0, 10.3), abs=0.01)  # its feet and 2 mm, and the depth by which it is sunk in
+    assert np.ptp(places, axis=0) == pytest.approx((14.0, 14.0, 10.3), abs=0.01)  # feet + 2 mm; height with its sunk part
     assert (stood.overhang_mm2, stood.size_mm[2]) == (pytest.approx(300.0), pytest.approx(40.0))
 
 

@@ -427,7 +427,7 @@ def test_an_invalid_plane_is_removed_even_if_another_one_is_invalid_without_it()
 
 
 def forbidding(*reasons: tuple[PlannedPart, str]) -> Callable[..., Coroutine[Any, Any, Any]]:
-    """Answers of processes that reject these planes; only the closer trials are made."""
+    """Answers of processes that reject these planes; of the other tasks only `stand` has a result."""
 
     async def answer(task: Any, *given: Any, **more: Any) -> Any:
         if task.__name__ != "try_cuts":

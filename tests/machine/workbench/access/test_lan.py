@@ -22,7 +22,7 @@ def network(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with two certificates, a.pem and b.pem, and their keys: a.key, b.key, and locked.key, which is a.key with a password."""
+    """A folder with certificates a.pem and b.pem and their keys: a.key, b.key, and locked.key, which is a.key with a password."""
     folder = tmp_path_factory.mktemp("certificates")
 
     def openssl(*arguments: str) -> None:

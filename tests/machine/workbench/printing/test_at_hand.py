@@ -48,7 +48,7 @@ def in_hand() -> Iterator[tuple[AtPage, Reporter]]:
     def serve() -> None:
         try:
             told.tell(end=by_hand(PrintJob(Simulated(), Does.HAND, profile=PROFILE), person))
-        except Exception as error:  # noqa: BLE001 - told as the process does
+        except Exception as error:  # noqa: BLE001 - reported as the process does
             told.tell(end=End(PrintState.FAILED, str(error)))
 
     thread = Thread(target=serve, daemon=True)
