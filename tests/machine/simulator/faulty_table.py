@@ -7,7 +7,7 @@ from machine.simulator.contact import ProbedTable
 
 
 class FaultyTable(ProbedTable):
-    """The probe fails to trigger from probing move number `silent_from`, and triggers at once from `early_from`; counted from 1."""
+    """From probing move number silent_from the probe never triggers, from early_from it triggers at once; counted from 1."""
 
     def __init__(self, *what: Any, silent_from: float = inf, early_from: float = inf, **more: Any) -> None:
         super().__init__(*what, **more)

@@ -1,4 +1,4 @@
-"""A UART is slow, overflows, and damages the lines that overflow; time is virtual unless a terminal is used."""
+"""A UART: its speed, overflow, and lines damaged by overflow; time is virtual unless a terminal is used."""
 
 import time
 from itertools import pairwise

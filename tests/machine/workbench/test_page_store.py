@@ -1,4 +1,4 @@
-"""The store of the page: changes are reported in order, each with the previous values, and only `update` changes it."""
+"""The store of the page: changes are reported in order, each with the previous values, and only the store writes into itself."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Long pauses: the motors stay on, the nozzle cools, and the print continues without a trace."""
+"""Long pauses: the motors stay on, the nozzle cools, and the print continues as if there had been no pause."""
 
 import re
 from collections.abc import Callable

@@ -58,7 +58,7 @@ class Table:
 
 
 def opened(size: int = 10**6, advanced: bool = True) -> Table:
-    """A greeted printer; the window is known if the printer reports line numbers."""
+    """A greeted printer; its send window is fully open if it reports line numbers."""
     table = Table(size)
     table.wait(0.6)
     table.say(b"ok N0 P15 B3\n" if advanced else b"ok\n")

@@ -94,7 +94,7 @@ def test_a_printer_that_never_answers_any_more_is_given_up_from_every_state(stat
 
 
 def test_the_diagram_of_the_docs_is_the_table() -> None:
-    """Read back every arrow of the diagram."""
+    """Every arrow of the diagram is in the table, and no other."""
     text = STATES.read_text(encoding="utf-8")
     assert text == diagram(), "run python tools/docs/make_tables.py"
     arrows = {

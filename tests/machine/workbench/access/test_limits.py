@@ -1,4 +1,4 @@
-"""Requests forbidden to a paired device: files of the computer by name, and machines that its user has not named."""
+"""Requests forbidden to a paired device: files of the computer by name, and machines not named at the computer itself."""
 
 from pathlib import Path
 from typing import Any
