@@ -20,17 +20,17 @@ FLAGS = [
     *("--disable-extensions", "--disable-dev-shm-usage", "--remote-debugging-pipe"),
     *("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist"),  # WebGL2 without a graphics card
 ]
-PLAIN = ("--disable-gpu-compositing",)  # what is around the picture is put together by the processor, at a third of the time
-PATIENCE_S = 150.0  # on a busy machine its start alone has taken 50 s
-OWN_WORDS = "GPU stall due to ReadPixels"  # what it says of itself where it is started with PLAIN
+PLAIN = ("--disable-gpu-compositing",)  # the processor composes the page around the picture, in a third of the time
+PATIENCE_S = 150.0  # starting it has taken 50 s on a busy machine
+OWN_WORDS = "GPU stall due to ReadPixels"  # a warning about itself that Chromium prints when it is started with PLAIN
 NAVIGATED = "Inspected target navigated or closed"  # the browser's answer when its page is left during a query
 
 
 class Browser:
-    """One Chromium with one page; a context: leaving it ends the process and removes its profile folder.
+    """Headless Chromium with one page; a context manager that ends the process and removes its profile folder.
 
-    density: pixels for each CSS pixel; half of one draws a quarter of the picture, and places and sizes of the page stay.
-    complaints: what the console and the page complained of; requests: every address asked for since the last `open`.
+    density: pixels for each CSS pixel; 0.5 draws a quarter of the pixels, while positions and sizes in the page are unchanged.
+    complaints: messages of the console and errors of the page; requests: every address requested since the last `open`.
     """
 
     def __init__(self, size: tuple[int, int] = (1280, 800), flags: tuple[str, ...] = (), density: float = 1.0) -> None:
@@ -59,7 +59,7 @@ class Browser:
             raise
 
     def _begin(self, size: tuple[int, int]) -> None:
-        """Take hold of the first page, which may come later than the first answer."""
+        """Attach to the first page, which may appear after the browser's first answer."""
         end_s = time.monotonic() + PATIENCE_S
         while not (pages := [t for t in self._send("Target.getTargets")["targetInfos"] if t["type"] == "page"]):
             if time.monotonic() > end_s:
@@ -82,7 +82,7 @@ class Browser:
             self._end()
 
     def _end(self) -> None:
-        """No process, pipe or folder stays, whatever has happened."""
+        """Remove the process, the pipe and the folder, whatever has happened."""
         self._process.kill()
         self._process.wait(PATIENCE_S)
         os.close(self._in)
@@ -90,21 +90,21 @@ class Browser:
         self._folder.cleanup()
 
     def open(self, address: str) -> None:
-        """Load a page and wait until it says that it is ready (or that it cannot draw)."""
+        """Load a page and wait until it reports that it is ready (or that it cannot draw)."""
         self.complaints.clear()
         self.requests.clear()
         self._send("Page.navigate", url=address)
         self.wait("['ready', 'failed'].includes(document.documentElement?.dataset.state)")
 
     def value(self, expression: str) -> Any:
-        """What a JavaScript expression gives, awaited where it is a promise. Raises RuntimeError for what it throws."""
+        """The value of a JavaScript expression, awaited if it is a promise. Raises RuntimeError for an exception in it."""
         answer = self._send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         if "exceptionDetails" in answer:
             raise RuntimeError(json.dumps(answer["exceptionDetails"])[:800])
         return answer["result"].get("value")
 
     def wait(self, condition: str) -> None:
-        """Until a JavaScript condition, or what it promises, holds. Raises TimeoutError with the console's complaints."""
+        """Wait until a JavaScript condition or its promise holds. Raises TimeoutError with the console's complaints."""
         end = time.monotonic() + PATIENCE_S
         while not self._holds(condition):
             if time.monotonic() > end:
@@ -113,7 +113,7 @@ class Browser:
             time.sleep(0.02)
 
     def _holds(self, condition: str) -> bool:
-        """Whether a condition holds; not yet where the page is left for another while it is asked."""
+        """Whether a condition holds; False if the page is left for another one during the query."""
         try:
             return bool(self.value(f"Promise.resolve({condition}).then(Boolean)"))
         except RuntimeError as error:
@@ -122,17 +122,17 @@ class Browser:
             return False
 
     def click(self, selector: str) -> None:
-        """A click on an element, as its own handler gets it."""
+        """Click an element by calling its `click()`."""
         self.value(f"document.querySelector({json.dumps(selector)}).click()")
 
     def middle(self, selector: str) -> tuple[float, float]:
-        """The middle of an element in the window."""
+        """The centre of an element in the window."""
         box = f"document.querySelector({json.dumps(selector)}).getBoundingClientRect()"
         x, y = self.value(f"(({{ x, y, width, height }}) => [x + width / 2, y + height / 2])({box})")
         return x, y
 
     def press(self, x: float, y: float) -> None:
-        """A real mouse click at a place of the page."""
+        """A real mouse click at a point of the page."""
         for kind in ("mouseMoved", "mousePressed", "mouseReleased"):
             self._send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
@@ -143,38 +143,38 @@ class Browser:
             self._send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def hold(self, start: tuple[float, float], *ways: tuple[float, float]) -> None:
-        """The left button pressed at a place, kept down and moved along others."""
+        """Press the left button at the first point and move it, still pressed, to the others."""
         for kind, (x, y) in (("mousePressed", start), *(("mouseMoved", way) for way in ways)):
             self._send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", buttons=1, clickCount=1)
 
     def release(self, point: tuple[float, float]) -> None:
-        """The left button let go."""
+        """Release the left button."""
         self._send("Input.dispatchMouseEvent", type="mouseReleased", x=point[0], y=point[1], button="left", clickCount=1)
 
     def touch(self, *moments: tuple[tuple[float, float], ...]) -> None:
-        """Fingers put down at the places of the first moment, moved to those of the others, and lifted."""
+        """Touch at the points of the first moment, move to those of the other moments, and lift the fingers."""
         for k, places in enumerate(moments):
             points = [{"x": x, "y": y, "id": finger} for finger, (x, y) in enumerate(places)]
             self._send("Input.dispatchTouchEvent", type="touchMove" if k else "touchStart", touchPoints=points)
         self._send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
 
     def key(self, key: str) -> None:
-        """One key pressed and released."""
+        """Press and release a key."""
         text = {"text": key} if len(key) == 1 else {}
         self._send("Input.dispatchKeyEvent", type="keyDown", key=key, **text)
         self._send("Input.dispatchKeyEvent", type="keyUp", key=key)
 
     def resize(self, width: int, height: int, mobile: bool = False) -> None:
-        """Another size of the window, in CSS pixels."""
+        """Resize the window, in CSS pixels."""
         given = {"width": width, "height": height, "deviceScaleFactor": self._density, "mobile": mobile}
         self._send("Emulation.setDeviceMetricsOverride", **given)
 
     def prefer(self, scheme: str) -> None:
-        """What the system asks for: dark or light."""
+        """Emulate the system's colour scheme: dark or light."""
         self._send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
     def screenshot(self, path: Path | None = None, scale: float = 1.0) -> bytes:
-        """The window as PNG; scale: the share of its size that the picture has."""
+        """A PNG of the window; scale: size of the image as a fraction of the window's."""
         width, height = self.value("[innerWidth, innerHeight]")
         clip = {"x": 0, "y": 0, "width": width, "height": height, "scale": scale}
         given = {} if scale == 1.0 else {"clip": clip}
@@ -184,13 +184,13 @@ class Browser:
         return picture
 
     def accessible(self) -> list[dict[str, str]]:
-        """Role and name of all that the page shows, as the browser tells those to whom it is read out."""
+        """Role and name of everything that the page exposes to a screen reader."""
         nodes = self._send("Accessibility.getFullAXTree")["nodes"]
         shown = [node for node in nodes if not node["ignored"]]
         return [{"role": node["role"]["value"], "name": node.get("name", {}).get("value", "")} for node in shown]
 
     def pdf(self) -> bytes:
-        """The page as it would be printed."""
+        """The page as a printed PDF."""
         return base64.b64decode(self._send("Page.printToPDF", printBackground=True)["data"])
 
     def _send(self, method: str, **given: Any) -> dict[str, Any]:
@@ -221,7 +221,7 @@ class Browser:
         return answer
 
     def _is_own(self, text: str) -> bool:
-        """Whether a warning comes of how this browser was started."""
+        """Whether a warning is due to the flags with which this browser was started."""
         return self._plain and OWN_WORDS in text
 
     def _note(self, event: dict[str, Any]) -> None:
@@ -238,13 +238,13 @@ class Browser:
 
 
 def _become(to_child: int, from_child: int) -> None:
-    """In the child: the pipe's ends where the browser looks for them."""
+    """In the child process: move the pipe's ends to the descriptors that the browser expects."""
     os.dup2(to_child, 3)
     os.dup2(from_child, 4)
 
 
 def _pipe() -> tuple[int, int]:
-    """Ends of a pipe that are neither 3 nor 4, which the browser takes for itself."""
+    """Move a pipe's ends away from descriptors 3 and 4, which the browser uses."""
     low = os.pipe()
     high = [fcntl.fcntl(end, fcntl.F_DUPFD_CLOEXEC, 10) for end in low]
     for end in low:

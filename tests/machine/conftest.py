@@ -1,4 +1,4 @@
-"""What tests have, each file its own: a browser, a workbench, and an empty folder."""
+"""Fixtures for each test file: a browser, a workbench, and an empty folder."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,7 +13,7 @@ DENSITY = 0.5  # pixels for each CSS pixel, for the same reason
 
 
 def small_browser(*flags: str) -> Browser:
-    """A browser that has little to draw."""
+    """A browser with a small window, which is quick to draw."""
     return Browser(WINDOW, (*PLAIN, *flags), DENSITY)
 
 
@@ -33,6 +33,6 @@ def bench() -> Iterator[Running]:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """An empty folder, from which commands are given."""
+    """An empty folder as the working directory."""
     monkeypatch.chdir(tmp_path)
     return tmp_path

@@ -1,4 +1,4 @@
-"""The workbench's own script run by Node on a page that is none: what it sends and says, without a browser."""
+"""The workbench's own scripts run by Node on a fake page, without a browser, to test the messages that they send and show."""
 
 import json
 import shutil
@@ -17,8 +17,8 @@ needs_node = pytest.mark.skipif(NODE is None, reason="Node is not installed: the
 
 
 def on_fake_page(act: str, script: Path = OWN / "print" / "print-panel.js") -> Any:
-    """What a function's body gives that runs in place of the page's `main`: by `$`, what fake_page.js has and what the script
-    exports, for one of the workbench's `printPanel`."""
+    """The value of a function body that runs in place of the page's `main`. It can use `$`, the definitions of fake_page.js and
+    the exports of the script, by default those of the workbench's `printPanel`."""
     assert NODE is not None
     ends = "given.then((value) => process.stdout.write(JSON.stringify(value), () => process.exit(0)));"
     names = 'const { printPanel } = modules["print/print-panel"] ?? {}, { $ } = modules["template/elements"];'

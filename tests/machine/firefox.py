@@ -1,4 +1,4 @@
-"""Firefox: driven by WebDriver BiDi, on a display that nobody sees where Xvfb is installed, else with none and without WebGL."""
+"""Firefox, driven by WebDriver BiDi: on a virtual display if Xvfb is installed, otherwise headless and without WebGL."""
 
 import base64
 import json
@@ -19,21 +19,21 @@ FIREFOX = shutil.which("firefox-esr") or shutil.which("firefox")
 XVFB = shutil.which("Xvfb")
 PREFERENCES = {
     "remote.active-protocols": 1,  # WebDriver BiDi
-    "webgl.force-enabled": True,  # also by software
+    "webgl.force-enabled": True,  # also with software rendering
     "app.normandy.enabled": False,
     "datareporting.policy.dataSubmissionEnabled": False,
     "browser.shell.checkDefaultBrowser": False,
     "network.captive-portal-service.enabled": False,
 }
 PATIENCE_S = 150.0
-KEYS = {"ArrowUp": "\ue013", "Escape": "\ue00c"}  # as WebDriver names them
+KEYS = {"ArrowUp": "\ue013", "Escape": "\ue00c"}  # the names in WebDriver
 ORIGIN = {"type": "pointer", "parameters": {"pointerType": "mouse"}, "id": "mouse"}
 
 
 class Firefox:
-    """One Firefox with one page, with those methods of `Browser` that the workbench's tests need; a context.
+    """Firefox with one page and the methods of `Browser` that the workbench's tests need; a context manager.
 
-    downloads: the folder into which it saves.
+    downloads: the folder in which it saves files.
     """
 
     def __init__(self, size: tuple[int, int] = (1280, 800)) -> None:
@@ -72,14 +72,14 @@ class Firefox:
         self._end()
 
     def open(self, address: str) -> None:
-        """Load a page and wait until it says that it is ready (or that it cannot draw)."""
+        """Load a page and wait until it reports that it is ready (or that it cannot draw)."""
         self.complaints.clear()
         self.requests.clear()
         self._send("browsingContext.navigate", context=self._page, url=address, wait="interactive")
         self.wait("['ready', 'failed'].includes(document.documentElement?.dataset.state)")
 
     def value(self, expression: str) -> Any:
-        """What a JavaScript expression gives, awaited where it is a promise. Raises RuntimeError for what it throws."""
+        """The value of a JavaScript expression, awaited if it is a promise. Raises RuntimeError for an exception in it."""
         target = {"context": self._page}
         answer = self._send("script.evaluate", expression=expression, target=target, awaitPromise=True)
         if answer["type"] != "success":
@@ -87,7 +87,7 @@ class Firefox:
         return _plain(answer["result"])
 
     def wait(self, condition: str) -> None:
-        """Until a JavaScript condition, or what it promises, holds. Raises TimeoutError with the console's complaints."""
+        """Wait until a JavaScript condition or its promise holds. Raises TimeoutError with the console's complaints."""
         end_s = time.monotonic() + PATIENCE_S
         while not self.value(f"Promise.resolve({condition}).then(Boolean)"):
             if time.monotonic() > end_s:
@@ -95,7 +95,7 @@ class Firefox:
             time.sleep(0.02)
 
     def click(self, selector: str) -> None:
-        """A click on an element, as its own handler gets it."""
+        """Click an element by calling its `click()`."""
         self.value(f"document.querySelector({json.dumps(selector)}).click()")
 
     def drag(self, start: tuple[float, float], end: tuple[float, float]) -> None:
@@ -106,20 +106,20 @@ class Firefox:
         self._send("input.performActions", context=self._page, actions=[{**ORIGIN, "actions": actions}])
 
     def press(self, x: float, y: float) -> None:
-        """A real mouse click at a place of the page."""
+        """A real mouse click at a point of the page."""
         self.drag((x, y), (x, y))
 
     def key(self, key: str) -> None:
-        """One key pressed and released: a letter, a figure or one of KEYS."""
+        """Press and release a key: a letter, a digit or one of KEYS."""
         actions = [{"type": kind, "value": KEYS.get(key, key)} for kind in ("keyDown", "keyUp")]
         self._send("input.performActions", context=self._page, actions=[{"type": "key", "id": "keys", "actions": actions}])
 
     def resize(self, width: int, height: int) -> None:
-        """Another size of the window, in CSS pixels."""
+        """Resize the window, in CSS pixels."""
         self._send("browsingContext.setViewport", context=self._page, viewport={"width": width, "height": height})
 
     def screenshot(self, path: Path | None = None) -> bytes:
-        """The window as PNG."""
+        """A PNG of the window."""
         picture = base64.b64decode(self._send("browsingContext.captureScreenshot", context=self._page)["data"])
         if path:
             path.write_bytes(picture)
@@ -140,7 +140,7 @@ class Firefox:
         self.resize(*size)
 
     def _end(self) -> None:
-        """No process and no folder stays, whatever has happened."""
+        """End the process and remove the folder, whatever has happened."""
         for process in (self._process, self._display):
             if process is not None:
                 process.kill()
@@ -169,7 +169,7 @@ class Firefox:
 
 
 def _display() -> tuple["subprocess.Popen[bytes] | None", dict[str, str]]:
-    """A display of its own, and the environment that names it; none where Xvfb is not installed."""
+    """A virtual display, with the environment that names it; None if Xvfb is not installed."""
     if XVFB is None:
         return None, {}
     read, write = os.pipe()
@@ -182,7 +182,7 @@ def _display() -> tuple["subprocess.Popen[bytes] | None", dict[str, str]]:
 
 
 def _plain(value: dict[str, Any]) -> Any:
-    """A value as BiDi sends it, plain."""
+    """A Python value from its BiDi representation."""
     match value["type"]:
         case "array":
             return [_plain(entry) for entry in value["value"]]

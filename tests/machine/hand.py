@@ -1,4 +1,4 @@
-"""A hand-made print of two parts: a post on the platform and an arm printed out of its side."""
+"""A hand-made print of two parts: a post on the build plate and an arm printed from its side."""
 
 from functools import cache
 
@@ -40,7 +40,7 @@ def part(index: int, mesh: Mesh, base: Plane, pose: Pose, machine: Machine) -> P
 
 
 def squares(piece: Part, profile: Profile, layers: int = 3) -> SlicedPart:
-    """Two squares a layer along the part's bounding box: the outer one reached with a retraction, the inner one without."""
+    """Two squares in each layer along the part's bounding box: the outer one reached with a retraction, the inner one without."""
     process, material = profile.process, profile.material
     add_c = material.first_layer_nozzle_c - material.nozzle_c if piece.on_plate else 0.0
     lo, hi = piece.in_part_frame().bounds_mm
@@ -60,7 +60,7 @@ def printed(
     machine: str = "generic_ac", layers: int = 3
 ) -> tuple[Profile, Decomposition, tuple[SlicedPart, ...], MachineProgram]:
     """Profile, decomposition, sliced parts and program of the post and the arm."""
-    profile = load(machine=machine, settings=["machine.purge_mm=0"])  # its line has tests of its own
+    profile = load(machine=machine, settings=["machine.purge_mm=0"])  # the purge line has its own tests
     decomposition = post_and_arm(profile.machine)
     sliced = tuple(squares(piece, profile, layers) for piece in decomposition.parts)
     return profile, decomposition, sliced, plan(decomposition, sliced, profile)
@@ -75,8 +75,8 @@ def text(machine: str = "generic_ac", layers: int = 3) -> tuple[str, ...]:
 
 @cache
 def whole(machine: str = "generic_ac") -> tuple[Profile, tuple[str, ...]]:
-    """Profile and G-code of a post printed to its top, 60 mm, and the arm on its side."""
-    profile = load(machine=machine, settings=["machine.purge_mm=0"])  # its line has tests of its own
+    """Profile and G-code of a post printed to its full height, 60 mm, and the arm on its side."""
+    profile = load(machine=machine, settings=["machine.purge_mm=0"])  # the purge line has its own tests
     decomposition = post_and_arm(profile.machine)
     sliced = [squares(piece, profile, layers) for piece, layers in zip(decomposition.parts, (300, 5), strict=True)]
     return profile, tuple(write_gcode(plan(decomposition, sliced, profile), profile))

@@ -1,4 +1,4 @@
-"""The moves of a program one by one, as tests read and write them."""
+"""Reading and writing the moves of a program one by one."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ from slicer.paths import KINDS, NUMBER, Kind
 
 @dataclass(frozen=True, eq=False)
 class Stroke:
-    """Extruding along points_mm (n, 3), the first is where the tip already stands; filament_mm: (n - 1,)."""
+    """Extruding along points_mm (n, 3), which begin at the tip's present position; filament_mm: (n - 1,)."""
 
     kind: Kind
     points_mm: Floats
@@ -34,7 +34,7 @@ class Travel:
 
 @dataclass(frozen=True, eq=False)
 class Wipe:
-    """Moving while filament is pulled back: filament_mm (n - 1,) above 0."""
+    """Moving while filament is retracted: filament_mm (n - 1,) above 0."""
 
     points_mm: Floats
     filament_mm: Floats
@@ -43,7 +43,7 @@ class Wipe:
 
 @dataclass(frozen=True)
 class Retract:
-    """Filament pulled back (positive) or pushed forward again (negative) at standstill."""
+    """Filament retracted (positive) or pushed forward again (negative) at standstill."""
 
     filament_mm: float
     speed_mm_s: float

@@ -1,4 +1,4 @@
-"""A page read back by the letter of its format in CONTRIBUTING.md, with nothing of the code that wrote it."""
+"""A reader of pages by the description of their format in CONTRIBUTING.md, independent of the code that writes them."""
 
 import base64
 import json
@@ -73,7 +73,7 @@ def _array(raw: bytes, form: dict[str, Any]) -> NDArray[Any]:
 
 
 def turned_back(axis: dict[str, Any], value_deg: float, point: NDArray[np.float64]) -> NDArray[np.float64]:
-    """A point turned by the inverse of T(value) or U(value) of the format in CONTRIBUTING.md, by Rodrigues' formula."""
+    """A point rotated by the inverse of T(value) or U(value) of the format in CONTRIBUTING.md, by Rodrigues' formula."""
     u, angle = np.array(axis["axis"]), np.radians(axis["sign"] * (value_deg - axis["zero_deg"]))
     across, along = np.cross(u, point), u * (u @ point)
     turned: NDArray[np.float64] = along + np.cos(angle) * (point - along) + np.sin(angle) * across

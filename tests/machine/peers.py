@@ -1,4 +1,4 @@
-"""Peers for tests of the link: what answers at a pseudo-terminal, at a socket, behind RFC 2217; and an ear that never hurries."""
+"""Peers for tests of the link, at a pseudo-terminal, at a socket and behind RFC 2217, and a port with a patient clock."""
 
 import os
 import pty
@@ -23,8 +23,8 @@ from machine.simulator.firmware import SimulatedFirmware
 from machine.simulator.record import Record
 
 RATES = {getattr(termios, f"B{rate}"): rate for rate in (9600, 57600, 115200, 230400, 1000000)}
-Answer = Callable[[bytes, int], bytes]  # what is received, baud rate that the host has set -> what is answered
-PATIENCE_S = 60.0  # for what is to come: a busy machine may take its time
+Answer = Callable[[bytes, int], bytes]  # bytes received, baud rate set by the host -> answer
+PATIENCE_S = 60.0  # timeout for bytes that must arrive, long enough for a busy machine
 
 
 @contextmanager
@@ -53,7 +53,7 @@ def on_terminal(answer: Answer, greeting: bytes = b"") -> Iterator[str]:
 
 
 def scripted(words: dict[str, str], otherwise: str = "ok") -> Answer:
-    """A peer that answers each line that begins with a word of the table as it says, any other line otherwise."""
+    """A peer that answers each line that begins with a word of the table by its entry, any other line by a default."""
     half = [b""]
 
     def answer(data: bytes, _baud: int) -> bytes:
@@ -72,7 +72,7 @@ def _said(line: str, words: dict[str, str], otherwise: str) -> str:
 
 @contextmanager
 def on_socket(firmware: SimulatedFirmware) -> Iterator[str]:
-    """The socket:// address of a firmware that is as fast as possible; one host after the other."""
+    """The socket:// address of an infinitely fast firmware; it accepts one host after the other."""
     server = socket.create_server(("localhost", 0))
 
     def serve() -> None:
@@ -99,7 +99,7 @@ def on_socket(firmware: SimulatedFirmware) -> Iterator[str]:
 
 
 class _WithoutModemLines(serial.Serial):  # type: ignore[misc]
-    """A pseudo-terminal has none, and says so with an error."""
+    """A pseudo-terminal has no modem lines and reports an error."""
 
     cts = dsr = ri = cd = True
 
@@ -111,7 +111,7 @@ class _WithoutModemLines(serial.Serial):  # type: ignore[misc]
 
 
 class _Wire:
-    """What pyserial's PortManager writes its own words to."""
+    """The object to which pyserial's PortManager writes its own messages."""
 
     def __init__(self, host: socket.socket) -> None:
         self.write = host.sendall
@@ -128,7 +128,7 @@ def behind_rfc2217(path: str) -> Iterator[str]:
         try:
             with host, _WithoutModemLines(path, timeout=0) as device:
                 _serve_rfc2217(host, device)
-        except OSError:  # the device behind it is gone
+        except OSError:  # the device behind it has disappeared
             return
 
     threading.Thread(target=serve, daemon=True).start()
@@ -139,7 +139,7 @@ def behind_rfc2217(path: str) -> Iterator[str]:
 
 
 def _serve_rfc2217(host: socket.socket, device: serial.Serial) -> None:
-    """Both directions until the host hangs up."""
+    """Forward both directions until the host hangs up."""
     manager = serial.rfc2217.PortManager(device, _Wire(host))
     while True:
         ready = select.select([host, device], [], [], 5.0)[0]
@@ -153,24 +153,24 @@ def _serve_rfc2217(host: socket.socket, device: serial.Serial) -> None:
 
 
 class Ear:
-    """A port, and a clock for who asks at it: once the other end has spoken and is silent again, all patience is over.
+    """A port and the clock of its reader: once the other end has answered and is silent again, every timeout has expired.
 
-    So nobody who speaks late, on a busy machine, is taken for silent, and nobody who has spoken is waited for.
+    Thus a late answer, on a busy machine, is not taken for silence, and there is no wait after an answer.
     """
 
-    _ahead = threading.local()  # ports are asked at the same time, each in a thread of its own
+    _ahead = threading.local()  # ports are queried at the same time, each in its own thread
 
     def __init__(self, port: Port) -> None:
         self._port, self.name, self.set_baud = port, port.name, port.set_baud
         self._spoke = False
 
     def write(self, data: bytes) -> None:
-        """Ask."""
+        """Send a query."""
         self._spoke = False
         self._port.write(data)
 
     def read(self) -> bytes:
-        """Listen."""
+        """Read an answer."""
         data = self._port.read()
         if self._spoke and not data:
             self._ahead.s = self._ahead_s() + 10 * PATIENCE_S
@@ -188,7 +188,7 @@ class Ear:
 
 
 def hear_out(monkeypatch: pytest.MonkeyPatch, asker: ModuleType, *mute: str) -> None:
-    """Let a module ask its ports once, with an ear; mute: ports at which nothing will be said, which are given up soon."""
+    """Let a module query its ports once through an Ear; mute: ports on which no answer will come, which time out soon."""
     monkeypatch.setattr(identification, "SERIAL", replace(identification.SERIAL, now_s=Ear.now_s))
     monkeypatch.setattr(identification, "ASK_S", 10 * PATIENCE_S)
     monkeypatch.setattr(identification, "POSITION_S", PATIENCE_S)
@@ -202,5 +202,5 @@ def hear_out(monkeypatch: pytest.MonkeyPatch, asker: ModuleType, *mute: str) -> 
 
 
 def happened(record: Record, what: str) -> bool:
-    """Whether an event that begins so is on a simulated printer's record."""
+    """Whether a simulated printer's record has an event that begins with these words."""
     return any(text.startswith(what) for _, text in record.events)

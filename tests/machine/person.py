@@ -1,4 +1,4 @@
-"""A person at a terminal: a command in a pseudo-terminal of its own, what is typed, and what is seen."""
+"""A user at a terminal: a command in its own pseudo-terminal, the keys pressed, and the text shown."""
 
 import codecs
 import os
@@ -16,7 +16,7 @@ from typing import Self
 ROOT = Path(__file__).parents[2]
 ESCAPES = re.compile(r"\x1b\[[0-9;?]*[A-Za-z]")
 PATIENCE_S = 60.0
-# Instead of `-m machine.cli.cli`: the same, but a line of progress comes, and a server is asked, every tenth of a second.
+# As `-m machine.cli.cli`, but with a line of progress, and a query to a server, every tenth of a second.
 HASTY = """
 import sys
 from machine.cli.cli import main
@@ -37,11 +37,11 @@ class Person:
 
     @property
     def seen(self) -> str:
-        """All that was shown, without colours and cursor moves."""
+        """All text shown, without colours and cursor moves."""
         return ESCAPES.sub("", self.raw)
 
     def see(self, text: str) -> None:
-        """Wait until something is shown, after what was seen before."""
+        """Wait until this text is shown, after the text seen before."""
         end_s = time.monotonic() + PATIENCE_S
         while (begin := self.seen.find(text, self._looked)) < 0:
             if not self._read() or time.monotonic() > end_s:
@@ -53,7 +53,7 @@ class Person:
         os.write(self._terminal, keys.encode())
 
     def settings(self) -> list[object]:
-        """The terminal's settings, as long as somebody has it open."""
+        """The terminal's settings, as long as a process has it open."""
         return termios.tcgetattr(self._terminal)
 
     def end(self) -> int:
@@ -81,7 +81,7 @@ class Person:
         return os.waitstatus_to_exitcode(ended[1])
 
     def _read(self) -> bool:
-        """Take what there is; False when the command has ended."""
+        """Read the available output; False when the command has ended."""
         if not select.select([self._terminal], [], [], 1.0)[0]:
             return True
         try:
@@ -93,7 +93,7 @@ class Person:
 
     def __enter__(self) -> Self:
         self._looked = 0
-        self._decoder = codecs.getincrementaldecoder("utf-8")("replace")  # a letter may come in two pieces
+        self._decoder = codecs.getincrementaldecoder("utf-8")("replace")  # a letter may arrive in two pieces
         self._child, self._terminal = pty.fork()
         if self._child == 0:
             os.chdir(ROOT)

@@ -1,4 +1,4 @@
-"""A page's line to the prints of a workbench that runs, and what a print has sent, by its log."""
+"""A page's connection to the prints of a running workbench, and the commands in a print's log."""
 
 import json
 import re
@@ -14,7 +14,7 @@ from tests.machine.browser import Browser
 from tests.machine.firefox import Firefox
 from tests.machine.running_workbench import PATIENCE_S, Running
 
-# Every control of the page and of the page of the print in it gets an e twice; what would be sent is heard and goes nowhere.
+# Presses e twice on every control of the page and of the print's page in it; messages are counted and not sent.
 LETTER_E = """(() => {
   let stops = 0;
   const send = WebSocket.prototype.send, kinds = [new Set(), new Set()];
@@ -29,11 +29,11 @@ LETTER_E = """(() => {
   WebSocket.prototype.send = send;
   return kinds.map((each) => [...each].sort());
 })()"""
-ASKS = ("M105", "M114")  # sent when a moment has come, not at a place of the program
+ASKS = ("M105", "M114")  # sent at certain times, not at certain lines of the program
 
 
 class PrintPage:
-    """What a page named `name` hears of the prints and says; the newest state of the newest print is `print`."""
+    """The connection of a page with this name to the prints; `print` is the newest state of the newest print."""
 
     def __init__(self, socket: ClientConnection) -> None:
         self._socket = socket
@@ -53,7 +53,7 @@ class PrintPage:
         self._socket.send(text)
 
     def command(self, command: str, **given: Any) -> None:
-        """The same of the newest print."""
+        """Send a command for the newest print."""
         self.do(command, print=self.print["number"], **given)
 
     def hear(self, end_s: float) -> None:
@@ -74,7 +74,7 @@ class PrintPage:
         return self.print
 
     def refused(self) -> str:
-        """The sentence with which what was asked last is refused."""
+        """The sentence with which the last request is refused."""
         end_s = time.monotonic() + PATIENCE_S
         while not self.problem:
             self.hear(end_s)
@@ -83,19 +83,19 @@ class PrintPage:
 
 @contextmanager
 def prints_line(running: Running, page: str) -> Iterator[PrintPage]:
-    """The line of a page of a workbench's first session."""
+    """The connection of a page of a workbench's first session to the prints."""
     address = f"ws://127.0.0.1:{running.port}{running.place}prints?page={page}"
     with connect(address, origin=f"http://127.0.0.1:{running.port}", max_size=None, proxy=None) as socket:  # type: ignore[arg-type]
         yield PrintPage(socket)
 
 
 def kinds_of_fields(browser: Browser | Firefox) -> tuple[list[str], list[str]]:
-    """The kinds of fields that need an e themselves, and those on which it is the emergency stop; while something prints."""
+    """The kinds of fields that accept the letter e, and those on which it is the emergency stop; only while a print runs."""
     typed, stopping = browser.value(LETTER_E)
     return typed, stopping
 
 
 def commands_sent(log: Path) -> list[str]:
-    """The commands of a log, without the numbers and checksums that they were sent with."""
+    """The commands of a log, without line numbers and checksums."""
     sent = re.findall(r"^\S+ > (?:N\d+ )?([^*\n]*)", log.read_text(), re.MULTILINE)
     return [command.strip() for command in sent if command.strip() and not command.startswith(ASKS)]

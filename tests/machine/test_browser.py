@@ -1,4 +1,4 @@
-"""The page in a real browser: what is read out, what is drawn, what hands, keys and a hostile name do to it."""
+"""The page of a print in a real browser: screen reader output, drawing, mouse, keys and a hostile file name."""
 
 import json
 from dataclasses import replace
@@ -37,7 +37,7 @@ G1 X0 Y0 E8
 M106 S255
 G1 X30 Y30 E9
 """
-# What the canvas holds right after the page has drawn it: in the same frame, for it is empty afterwards.
+# The canvas right after the page has drawn it: in the same frame, because it is empty afterwards.
 PICTURE = """new Promise((done) => {
   const look = () => {
     if (document.documentElement.dataset.picture !== 'idle') return setTimeout(look, 5);
@@ -46,7 +46,7 @@ PICTURE = """new Promise((done) => {
   };
   look();
 })"""
-# Calls back in the midst of a picture.
+# Calls a function while a picture is being drawn.
 WHILE_DRAWN = """((then) => {
   const root = document.documentElement;
   const seen = new MutationObserver(() => { if (root.dataset.picture === 'drawing') { seen.disconnect(); then(); } });
@@ -69,7 +69,7 @@ REDS = f"""{PICTURE}.then(async (address) => {{
 
 @cache
 def program(machine: str = "generic_ac") -> tuple[Any, Program]:
-    """The post and the arm, dry-run: the arm begins in air, which is found."""
+    """The post and the arm, dry-run: the arm begins in air, which is reported."""
     profile, decomposition, _, _ = hand.printed(machine)
     lines = hand.text(machine)
     return profile, Program(lines, dry_run(lines, profile), decomposition)
@@ -84,7 +84,7 @@ def page(browser: Browser, tmp_path: Path) -> Browser:
 
 @pytest.fixture
 def foreign(browser: Browser, tmp_path: Path) -> Browser:
-    """A file of another program without comments, under a name that would like to be more than a name."""
+    """A file of another program without comments, under a hostile name."""
     profile, lines = load(), tuple(FOREIGN.splitlines())
     return opened(browser, tmp_path, print_page(HOSTILE, Program(lines, dry_run(lines, profile), None), profile, known=False))
 
@@ -99,7 +99,7 @@ def opened(browser: Browser, folder: Path, content: bytes) -> Browser:
 
 
 def put(browser: Browser, name: str, value: object) -> None:
-    """A slider or a list set to a value, as by hand."""
+    """Set a slider or a list to a value, as the user does."""
     browser.value(
         f"(() => {{ const e = document.getElementById('{name}'); e.value = '{value}';"
         "e.dispatchEvent(new Event(e.tagName === 'SELECT' ? 'change' : 'input')); })()"
@@ -115,7 +115,7 @@ def row(browser: Browser) -> int:
 
 
 def drawn(browser: Browser) -> int:
-    """Rows in the picture, once it is drawn."""
+    """The number of rows in the picture, once it is drawn."""
     browser.value(PICTURE)
     return int(browser.value("Number(document.documentElement.dataset.drawn)"))
 
@@ -171,7 +171,7 @@ def test_a_section_takes_beads_away_on_either_side_of_it_and_clicks_go_through(p
     last = row(page)
     canvas = "document.getElementById('canvas').getBoundingClientRect()"
     x, y = page.value(f"(({{ x, y, width, height }}) => [x + width / 2, y + height / 2])({canvas})")
-    page.press(x, y)  # no bead is left there
+    page.press(x, y)  # no bead is left at this point
     assert row(page) == last
     put(page, "section-along", "")
     assert page.value(PICTURE) == before
@@ -262,7 +262,7 @@ def test_parts_are_drawn_apart_and_the_table_stands_as_for_one(browser: Browser,
 
 @pytest.fixture
 def choices(browser: Browser, tmp_path: Path) -> Browser:
-    """The post and the arm with a front of three rows: whole, as they are, and the post cut once more."""
+    """The post and the arm with a front of three rows: whole, as they are, and with one more cut of the post."""
     profile, decomposition, _, _ = hand.printed()
     post = Plane(np.array([0.0, 0.0, 1.0]), 30.0)
     front = (
@@ -317,7 +317,7 @@ def test_where_there_is_no_choice_no_front_is_shown(page: Browser) -> None:
 def test_a_finding_is_marked_and_a_click_goes_there(page: Browser) -> None:
     finding = program()[1].run.findings[0]
     put(page, "position", 0)
-    page.value(PICTURE)  # markers come with the first picture
+    page.value(PICTURE)  # markers appear with the first picture
     page.click("#markers button")
     assert text(page, "readout-line") == str(finding.line)
     assert page.value("document.querySelector('#findings .chosen').textContent").startswith(f"error: {finding.code}")
@@ -444,7 +444,7 @@ def test_the_picture_keeps_its_width_when_the_report_is_opened(page: Browser) ->
     before = page.value(width)
     page.click("#tab-report")
     assert page.value(width) == before
-    assert page.value("[...document.querySelectorAll('#report .table')].every((table) => table.tabIndex === 0)")  # it may scroll
+    assert page.value("[...document.querySelectorAll('#report .table')].every((table) => table.tabIndex === 0)")  # may scroll
 
 
 def test_the_report_holds_every_part_and_is_printed_with_the_picture(page: Browser) -> None:

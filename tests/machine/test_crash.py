@@ -1,4 +1,4 @@
-"""Bugs: what a person is told of one, also on a full disk."""
+"""Crash reports: the message of a bug, also on a full disk."""
 
 import errno
 import os

@@ -1,4 +1,4 @@
-"""Planted faults: each is found by its own code on every machine that ships and tilts."""
+"""Planted faults: each is found by its own code on every shipped machine that tilts."""
 
 import re
 from functools import cache
@@ -38,7 +38,7 @@ EVERY = pytest.mark.parametrize("machine", [name for name in shipped("machine") 
 
 
 def _post(profile: Profile, low_mm: float = 26.0) -> Decomposition:
-    """A post of 9 x 9 mm in two parts, the upper one printed leaning by 25 degrees from low_mm on."""
+    """A post of 9 x 9 mm in two parts, the upper one printed leaning by 25 degrees from low_mm."""
     solid, plane = m3.Manifold.cube((9.0, 9.0, low_mm + 8.0)).translate((-4.5, -4.5, 0.0)), Plane(LEANING, low_mm * LEANING[2])
     above, below = cut(solid, plane)
     leaning = [pose for pose in poses(profile.machine, LEANING) if profile.machine.tilts]
@@ -96,7 +96,7 @@ def test_a_plane_cut_too_low_for_the_head_is_found(machine: str) -> None:
 
 
 def _bare(machine: Machine) -> Machine:
-    """The machine as a planner sees it that knows of no head but its tip."""
+    """The machine as seen by a planner that knows no part of the head except its tip."""
     head = machine.head.model_copy(update={"silhouette_mm": [(0.1, 0.0)], "boxes": []})
     return machine.model_copy(update={"head": head})
 

@@ -1,4 +1,4 @@
-"""However a printer is left, its heaters go off: an error is raised at every step of every loop that commands one."""
+"""The heaters go off however a printer is left: an error is raised at every step of every loop that commands one."""
 
 import io
 import signal
@@ -33,7 +33,7 @@ from profiles.profile import load
 from tests.machine.peers import happened
 from tests.machine.virtual_printer import PATH, VirtualPrinter
 
-# Fast axes make a run short; the printer of every run is another one.
+# Fast axes make a run short; every run has its own printer.
 PROFILE = load(settings=["machine.x.speed_mm_s=500", "machine.y.speed_mm_s=500", "machine.z.speed_mm_s=100"])
 ERRORS = (RuntimeError, KeyboardInterrupt, MoveError, OSError, PortError)
 HEAT, HOME, JOG = HandCommand(HandDoes.HEAT), HandCommand(HandDoes.HOME), HandCommand(HandDoes.JOG, "X", 5.0)
@@ -42,7 +42,7 @@ MonkeyPatch = pytest.MonkeyPatch
 
 @dataclass
 class Steps:
-    """Counts the steps of a run, from 1, and raises an error at some of them. last: the newest values that were told."""
+    """Counts the steps of a run, from 1, and raises an error at some of them. last: the newest values reported."""
 
     error: BaseException = field(default_factory=RuntimeError)
     raise_at: tuple[int, ...] = ()
@@ -56,12 +56,12 @@ class Steps:
             raise self.error
 
     def on_wire(self, medium: Medium) -> Medium:
-        """The medium, every wire of which takes steps."""
+        """The medium, with every wire counting steps."""
         return replace(medium, open=lambda name, baud: SteppedWire(medium.open(name, baud), self))
 
 
 class SteppedWire:
-    """A step before and after every write, and after every read that has brought something."""
+    """A step before and after every write, and after every read that has returned bytes."""
 
     def __init__(self, wire: Wire, steps: Steps) -> None:
         self.name, self.discard, self.close = wire.name, wire.discard, wire.close
@@ -88,7 +88,7 @@ Loop = Callable[[Steps, VirtualPrinter, MonkeyPatch], None]
 
 
 def in_hand(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch, *commands: HandCommand) -> End:
-    """What a person does by hand, and how it ended."""
+    """Manual commands of the user, and how the control ended."""
     medium = steps.on_wire(printer.medium)
     monkeypatch.setattr(ports, "open_port", medium.open)
     monkeypatch.setattr(at_hand, "CommandSession", partial(CommandSession, medium=medium))
@@ -118,7 +118,7 @@ def measuring(steps: Steps, printer: VirtualPrinter, monkeypatch: MonkeyPatch) -
         mover = PrinterMover(session, calibration_pen(PROFILE))
         with tip_raised_after(mover):
             begin_cold(session, mover, PROFILE.machine)
-            session.command("M104 S200")  # as a macro of the machine's own would
+            session.command("M104 S200")  # as a macro of the machine could do
             mover.turn(Pose(10.0, 0.0))
             mover.cross(5.0, 5.0)
             mover.arrive()
@@ -139,7 +139,7 @@ def _folders(tmp_path: Path, monkeypatch: MonkeyPatch) -> None:
 
 
 def targets_c(printer: VirtualPrinter) -> tuple[float, float]:
-    """What nozzle and bed are to be, once all that was sent is done."""
+    """The targets of nozzle and bed once all sent commands have been executed."""
     printer.firmware.advance()
     return printer.record.nozzle_target_c, printer.record.bed_target_c
 
@@ -244,7 +244,7 @@ def test_who_leaves_twice_ends_a_session_once() -> None:
     with session_at(printer) as session:
         session.greet()
         session.command("M104 S200")
-        session.order(LeftError)  # heard of when the heaters are asked for: it is left already
+        session.order(LeftError)  # noticed when the heaters are queried, so it has already left
     assert targets_c(printer) == (0.0, 0.0)
 
 

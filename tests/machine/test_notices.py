@@ -1,4 +1,4 @@
-"""What stands in names and files commands no terminal, and no message is endless."""
+"""Names and file contents send no control sequences to the terminal, and no message is endless."""
 
 import os
 from pathlib import Path

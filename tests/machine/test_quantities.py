@@ -1,4 +1,4 @@
-"""Quantities: what a print costs, where its material has a price."""
+"""Quantities: the cost of a print whose material has a price."""
 
 import pytest
 

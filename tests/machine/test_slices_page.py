@@ -1,4 +1,4 @@
-"""Slices looked at in a real browser, in the page of the print and in the workbench: layers, times, text, findings, saving."""
+"""Slices in a real browser, in the page of the print and in the workbench: layers, times, text, findings, saving."""
 
 import base64
 import json
@@ -38,7 +38,7 @@ def type_in(browser: Browser, name: str, value: object) -> None:
 
 
 def choose_text(browser: Browser, lines: tuple[str, ...]) -> None:
-    """The print's file, chosen in the page as a person does."""
+    """Choose the print's file in the page as the user does."""
     content = "\n".join(lines) + "\n"
     browser.value(
         f"""{{ const chosen = new DataTransfer();
@@ -50,7 +50,7 @@ def choose_text(browser: Browser, lines: tuple[str, ...]) -> None:
 
 
 def wait_for_marked(browser: Browser, number: int, lines: tuple[str, ...]) -> None:
-    """Until a line of the text is the one that is marked: the list scrolls to it first."""
+    """Wait until this line of the text is marked; the list scrolls to it first."""
     browser.wait(f"document.querySelector('#code-seen .now')?.textContent === {json.dumps(f'{number}{lines[number - 1]}')}")
 
 
@@ -78,7 +78,7 @@ def test_a_click_beside_the_layers_goes_to_that_layer_whose_time_is_told(page: B
     page.press(x, y + 8)
     top = page.value("Number(document.getElementById('layer-high').max)")
     assert layer(page, "high")[0] == str(top)
-    assert row(page) > 0  # what is chosen is printed, too
+    assert row(page) > 0  # the chosen line counts as printed
     page.press(x, y + high - 8)
     assert layer(page, "high")[0] == "0"
     assert "layer 1, 0.20 mm, takes " in page.value("document.getElementById('layer-high').getAttribute('aria-valuetext')")
@@ -137,7 +137,7 @@ FRAME = "document.getElementById('print-page').contentWindow"
 
 
 def in_frame(browser: Browser, words: str) -> str:
-    """What a condition or value is in the page of the print that lies in the workbench's."""
+    """An expression evaluated in the print's page inside the workbench's page."""
     return f"((document) => {words})({FRAME}.document)"
 
 
@@ -145,7 +145,7 @@ def slice_it(browser: Browser) -> None:
     browser.click("#tab-slices")
     browser.click("#slice")
     done = "$('slicing-bar').hidden && !['no-slices', 'stale'].some((word) => document.body.classList.contains(word))"
-    browser.wait(done)  # not for the bar before it: a little model is sliced sooner than one looks
+    browser.wait(done)  # do not wait for the progress bar first: a small model may already be sliced
     browser.value("$('leave-print').hidden || $('leave-print').click()")
 
 
@@ -254,7 +254,7 @@ def test_errors_of_the_slices_refuse_a_print_at_once_and_stale_slices_cannot_be_
     problem = browser.value("$('print-problem').textContent")
     assert problem.startswith("the dry run found 2 errors, the first: ")
     assert problem.endswith("(tick Continue anyway to print it)")
-    assert browser.value("$('run').hidden")  # nobody has been asked who is there
+    assert browser.value("$('run').hidden")  # no printer has been queried
     browser.click("#undo")
     browser.wait("$('check').disabled && $('force-line').hidden && $('print-problem').hidden")
     browser.click("#redo")
@@ -294,7 +294,7 @@ def test_copies_and_pauses_are_typed_told_and_taken_away(browser: Browser, bench
     walls = "[[-30, -20, 0], [30, 20, 4]].map((place) => ({ places: new Float32Array(place) }))"
     names = "{ ...modules['picture/math'], ...modules['scene/picture'] }"
     framed = browser.value(f"(({{ bounds, placesDrawn }}) => bounds(placesDrawn({{ {scene}, walls: {walls} }}).flat()))({names})")
-    assert framed == [[-30, -20, 0], [30, 20, 4]]  # the walls of copies, too
+    assert framed == [[-30, -20, 0], [30, 20, 4]]  # including the walls of copies
     type_in(browser, "copies", 0)
     browser.wait("$('problem').textContent === 'Copies is 0: 1 to 1000 is allowed' && $('copies').value === '1'")
     type_in(browser, "stop-kind", "filament_change")

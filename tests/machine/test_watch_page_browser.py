@@ -1,4 +1,4 @@
-"""The page of a running print in a real browser: its buttons pause, resume and stop what the terminal prints."""
+"""The page of a running print in a real browser: its buttons pause, resume and stop the print of the terminal."""
 
 import re
 import subprocess
@@ -20,9 +20,9 @@ LIVE = "$('live').textContent"
 
 @contextmanager
 def printing(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
-    """`print --watch` of an hour and more on the simulated printer, and the address that it tells."""
+    """`print --watch` for over an hour on the simulated printer, and the address that it prints."""
     file = folder / "long.gcode"
-    # A pause waits for the end of a stroke, so they are short in time; in places of their own they are soon drawn.
+    # A pause waits for the end of a stroke, so each stroke is short in time; in separate places they are drawn sooner.
     strokes = "".join(f"G1 X40 Y{k % 100} E{k + 1} F60\nG0 X10 F6000\n" for k in range(1000))
     file.write_text(BEGIN + strokes + END)
     options = ["--port", "sim", "--sim-speed", "200", "--watch", "--no-browser", "--force"]
@@ -39,7 +39,7 @@ def printing(folder: Path) -> Iterator[tuple["subprocess.Popen[str]", str]]:
 
 def test_a_print_is_paused_resumed_and_stopped_by_buttons(browser: Browser, tmp_path: Path) -> None:
     with printing(tmp_path) as (process, address):
-        browser.resize(400, 300)  # little to draw: the print's moves are many
+        browser.resize(400, 300)  # a small picture, because the print has many moves
         browser.open(address)
         browser.value("{ window.$ = (id) => document.getElementById(id); }")
         browser.wait(f"{LIVE}.startsWith('printing') && !$('orders').hidden")
@@ -58,7 +58,7 @@ def test_a_print_is_paused_resumed_and_stopped_by_buttons(browser: Browser, tmp_
 
 def test_an_emergency_stop_is_asked_once_and_the_print_ends(browser: Browser, tmp_path: Path) -> None:
     with printing(tmp_path) as (process, address):
-        browser.resize(400, 300)  # little to draw: the print's moves are many
+        browser.resize(400, 300)  # a small picture, because the print has many moves
         browser.open(address)
         browser.wait("document.getElementById('live').textContent.startsWith('printing')")
         browser.click("#emergency")

@@ -1,5 +1,5 @@
-"""Who sees little or nothing, on the workbench and on the page of a print: colours that stand out from their ground, light and
-dark, a name for every control, and none where no name is read out."""
+"""Accessibility of the workbench and of the page of a print: contrast in the light and the dark theme, a name for every
+control, and no name that is never read out."""
 
 import re
 from pathlib import Path
@@ -22,7 +22,7 @@ OPERATED = {"button", "checkbox", "combobox", "radio", "searchbox", "slider", "s
 
 
 def colours(theme: str) -> dict[str, str]:
-    """The variables of both style sheets that are plain colours, as a theme has them."""
+    """The variables of both style sheets that are plain colours, with the values of a theme."""
     text = "".join(path.read_text() for path in STYLES)
     blocks = re.findall(r":root(\[data-theme=\"dark\"\])? \{(.*?)\}", text, re.DOTALL)
     own = [block for dark, block in blocks if not dark or theme == "dark"]
@@ -30,7 +30,7 @@ def colours(theme: str) -> dict[str, str]:
 
 
 def luminance(colour: str) -> float:
-    """Of sRGB as six hexadecimal digits, by WCAG 2.2."""
+    """Relative luminance of an sRGB colour in six hexadecimal digits, by WCAG 2.2."""
     shares = [int(colour[k : k + 2], 16) / 255.0 for k in (0, 2, 4)]
     red, green, blue = (share / 12.92 if share <= 0.04045 else ((share + 0.055) / 1.055) ** 2.4 for share in shares)
     return 0.2126 * red + 0.7152 * green + 0.0722 * blue
@@ -67,7 +67,7 @@ def test_text_over_the_picture_stands_out_whatever_is_drawn_behind_it(theme: str
 
 
 def test_nothing_but_what_cannot_be_pressed_is_made_faint() -> None:
-    """A share of opacity lessens the contrast of the text in it: only disabled controls and pictures need none."""
+    """Partial opacity lowers the contrast of text: only disabled controls and pictures may use it."""
     faint = re.findall(r"^(.*?) \{[^}]*(?<!-)\bopacity: 0\.\d+[^}]*\}", STYLES[1].read_text(), re.MULTILINE)
     assert {rule for rule in faint if not re.search(r":disabled|#rings|#canvas", rule)} == set()
 
@@ -88,7 +88,7 @@ def test_every_control_of_every_tab_has_a_name(bench: Running, browser: Browser)
 def test_every_control_of_the_page_of_a_print_has_a_name(browser: Browser, tmp_path: Path) -> None:
     profile, decomposition, _, _ = hand.printed()
     lines = hand.text("generic_ac")
-    printed = Program(lines, dry_run(lines, profile), decomposition)  # its arm begins in air, which is found
+    printed = Program(lines, dry_run(lines, profile), decomposition)  # its arm begins in air, which is reported
     (tmp_path / "print.html").write_bytes(print_page("post and arm", printed, profile))
     browser.open((tmp_path / "print.html").as_uri())
     assert browser.value("document.querySelectorAll('#findings button').length") > 0
@@ -98,10 +98,10 @@ def test_every_control_of_the_page_of_a_print_has_a_name(browser: Browser, tmp_p
 
 
 def check_names(browser: Browser, at_least: int) -> None:
-    """All that is operated, at least so many, has a name, and what is no thing of its own has none, for that is not read out."""
+    """At least this number of controls exist, all have names, and no element without a role has a name that is never read out."""
     browser.value(
         "new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)))"
-    )  # what is drawn first has names
+    )  # elements drawn now have names
     controls = [node for node in browser.accessible() if node["role"] in OPERATED]
     assert len(controls) >= at_least
     assert [node for node in controls if not node["name"].strip()] == []
@@ -113,7 +113,7 @@ NOT_READ_OUT = """[...document.querySelectorAll(':is(div, p, span)[aria-label]:n
   .map(({ outerHTML }) => outerHTML.slice(0, 80))"""
 
 
-# Of buttons: what is seen on them belongs into their name, or nobody can press them by voice.
+# Buttons whose visible text is missing from their name, so that they cannot be pressed by voice.
 SEEN_NOT_SAID = """[...document.querySelectorAll('button[aria-label]')].filter((button) => {
   const seen = button.textContent.trim().toLowerCase();
   return /[a-z0-9]/.test(seen) && button.checkVisibility() && !button.ariaLabel.toLowerCase().includes(seen);

@@ -1,4 +1,4 @@
-"""The whole way on one page: file, parts, a plane moved, one locked, slices, a print; and the same from the command line."""
+"""The whole workflow on one page: file, parts, a plane moved, one locked, slices, a print; and the same by the command line."""
 
 import json
 import shutil

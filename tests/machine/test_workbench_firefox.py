@@ -1,4 +1,4 @@
-"""The workbench in Firefox: one journey through all that it does, each test a stage of it, from the file to the printed part."""
+"""The workbench in Firefox: one session through all its functions in stages, from the file to the printed part."""
 
 import time
 from collections.abc import Iterator
@@ -41,7 +41,7 @@ def put(firefox: Firefox, element: str, value: object, event: str = "change") ->
 
 
 def put_setting(firefox: Firefox, key: str, value: object) -> None:
-    """A setting found by its name, changed, and marked as changed."""
+    """Find a setting by its name, change it, and check that it is marked as changed."""
     put(firefox, "$('search-settings')", key, "input")
     firefox.wait(f"document.querySelector('[data-key=\"{key}\"]')")
     assert firefox.value("document.querySelectorAll('#settings-list [data-key]').length") == 1
@@ -111,7 +111,7 @@ def test_firefox_drags_tilts_and_locks_a_plane_and_finds_the_others_beside_a_mar
         firefox.value("document.activeElement.blur()")
     put(firefox, "$('plane-tilt')", 30)
     cuts = "JSON.stringify(modules['page/store'].store.state.cuts)"
-    firefox.wait(f"$('plane-tilt').value === '30.0' && {cuts}.includes('0.866')")  # its cosine: the bench has it
+    firefox.wait(f"$('plane-tilt').value === '30.0' && {cuts}.includes('0.866')")  # the cosine in the bench's plane
     firefox.click("#parts-list input[type=checkbox]")
     firefox.wait("$('plane-offset').disabled && !$('find-others').disabled")
     put(firefox, "$('mark-kind')", "no_support")

@@ -1,4 +1,4 @@
-"""A G-code file dropped on the workbench: looked at with what its dry run found, and printed with the checks of `print`."""
+"""A G-code file dropped on the workbench: shown with the findings of its dry run, and printed with the checks of `print`."""
 
 import json
 from pathlib import Path
@@ -18,7 +18,7 @@ GOOD = "G21\nG90\nM83\nG28\nM104 S210\nM109 S210\nG1 Z0.3 F600\nG1 X10 E1 F600\n
 
 
 def opened(browser: Browser, running: Running, name: str, content: str) -> None:
-    """A file dropped on the page of an empty bench, until its page is there."""
+    """Drop a file on the page of an empty bench and wait for its page."""
     browser.open(running.address)
     browser.wait("document.documentElement.dataset.version")
     choose(browser, name, content.encode())

@@ -1,4 +1,4 @@
-"""The workbench from another device of the network: paired by a code, on a page of a phone's size, and let go again."""
+"""The workbench from another device of the network: paired by a code, on a page of a phone's size, and removed again."""
 
 import http.client
 import json
@@ -68,7 +68,7 @@ class Device:
 
 
 class DevicesPage:
-    """The line of this computer's page to the door; state: the newest that it has told."""
+    """The websocket of this computer's page for paired devices; state: the newest state received."""
 
     def __init__(self, line: ClientConnection) -> None:
         self._line = line
@@ -138,7 +138,7 @@ def test_a_hundred_codes_by_parallel_lines_pair_nobody_and_the_others_go_on() ->
             answers = list(pool.map(lambda k: Device(bench).pair(f"WRNG{k:04}"), range(100)))
             assert sorted({*answers}) == [403, 429]
             assert answers.count(403) == 5
-            assert Device(bench).pair(bench.code()) == 429  # the right one waits, too
+            assert Device(bench).pair(bench.code()) == 429  # the right code has to wait, too
             page.do("demo", name="demo:bracket")
             page.until(lambda state: state["model"])
             assert bench.ask("")[0] == 200
@@ -209,7 +209,7 @@ def test_from_the_phone_a_model_is_turned_and_a_print_stopped(bench: OpenToNetwo
     assert [node["name"] for node in roles if node["role"] in ("textbox", "button")] == ["Code", "Pair this device"]
     assert browser.value("document.documentElement.scrollWidth <= innerWidth")
     browser.screenshot(tmp_path / "pairing.png")
-    browser.complaints.clear()  # of the answer to a wrong code
+    browser.complaints.clear()  # about the answer to a wrong code
     browser.value(f"document.getElementById('code').value = '{bench.code().lower()}'")
     browser.value("document.querySelector('button').click()")
     browser.wait("document.documentElement?.dataset.line === 'open' && document.documentElement.dataset.state === 'ready'")

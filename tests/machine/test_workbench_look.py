@@ -11,7 +11,7 @@ from tests.shapes import box, tee
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
 TABS = ("model", "parts", "slices", "printing", "settings")
-# Texts that are seen and smaller than 12 px.
+# Visible texts that are smaller than 12 px.
 TINY = """(() => { const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), small = [];
   for (let text = texts.nextNode(); text; text = texts.nextNode()) {
     const within = text.parentElement, size = parseFloat(getComputedStyle(within).fontSize);
@@ -21,16 +21,16 @@ TINY = """(() => { const texts = document.createTreeWalker(document.body, NodeFi
 # Buttons in the colour of the next step.
 MAIN = """[...document.querySelectorAll('#panel button')].filter((one) => one.checkVisibility() &&
   getComputedStyle(one).backgroundColor === getComputedStyle($('open')).backgroundColor).map((one) => one.id)"""
-# How far the tools stand out of the picture, px.
+# How far the tools extend beyond the picture, px.
 OUTSIDE = """(() => { const [a, b] = ['plane-tools', 'scene'].map((id) => $(id).getBoundingClientRect());
   return Math.max(b.left - a.left, b.top - a.top, a.right - b.right, a.bottom - b.bottom); })()"""
-# Knobs of the plane that the tools or another knob stand over.
+# Knobs of the plane that are covered by the tools or by another knob.
 COVERED = """[...document.querySelectorAll('#handles button')].filter((knob) => { const a = knob.getBoundingClientRect();
   const over = (b) => a.left < b.right && b.left < a.right && a.top < b.bottom && b.top < a.bottom;
   const others = [...document.querySelectorAll('#plane-tools, #handles button')].filter((one) => one !== knob);
   return others.some((one) => over(one.getBoundingClientRect()));
 }).map((knob) => knob.id)"""
-# Pairs of things over the picture that cover one another.
+# Pairs of elements over the picture that overlap.
 OVERLAPS = """(() => { const seen = ['axes', 'tools', 'plane-tools', 'legend', 'notice'].filter((id) => $(id).checkVisibility());
   const boxes = seen.map((id) => [id, $(id).getBoundingClientRect()]).filter(([, box]) => box.width);
   return boxes.flatMap(([id, a], k) => boxes.slice(k + 1).filter(([, b]) => (
@@ -48,7 +48,7 @@ def with_plane(browser: Browser, bench: Running) -> None:
 
 
 def control(browser: Browser, key: str) -> None:
-    """A key pressed with Ctrl held."""
+    """Press a key with Ctrl held."""
     browser.value(f"document.body.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}', ctrlKey: true, bubbles: true }}))")
 
 
@@ -176,7 +176,7 @@ def test_the_tools_stand_in_the_picture_hide_no_knob_and_say_why_a_plane_is_refu
         browser.wait(f"{OUTSIDE} <= 0 && {COVERED}.length === 0")
     drag_slider(browser, "plane-offset", 39.95, "change")
     browser.wait("$('plane-told').classList.contains('refused') && $('put-near').checkVisibility()")
-    assert not browser.value("$('problem').checkVisibility()")  # it is told once
+    assert not browser.value("$('problem').checkVisibility()")  # it is reported only once
     browser.wait(f"{OUTSIDE} <= 0 && {COVERED}.length === 0")
     browser.click("#put-aside")
     browser.wait("!$('plane-told').classList.contains('refused') && !$('put-near').checkVisibility()")

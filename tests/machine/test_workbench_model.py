@@ -1,4 +1,4 @@
-"""The model on the workbench in a real browser: turned by its rings, scaled, and told where the machine does not reach it."""
+"""The model on the workbench in a real browser: rotated by its rings, scaled, and marked beyond the machine's reach."""
 
 import json
 import re
@@ -28,7 +28,7 @@ SLIPPED = """(({ add, scaled, sub, unit }, { faceMet }) => { let seed = 7;
     return faceMet({ corners: [a, b, c, b, a, d].flat(), count: 2 }, from, unit(sub(on, from)));
   }).filter(({ face }) => face < 0).length; })(modules["picture/math"], modules["scene/face-tree"])"""
 MENU = ["Remove", "Lock", "Print earlier", "Print later", "Settings of this part"]
-# The key comes before the page is drawn anew, which is when a browser takes the focus from what is hidden.
+# The key arrives before the page is redrawn, when a browser removes the focus from hidden elements.
 LOCK_AND_DELETE = """{ document.querySelector('#part-menu button:nth-child(2)').click();
   document.activeElement.dispatchEvent(new KeyboardEvent('keydown', { key: 'Delete', bubbles: true })); }"""
 MENU_OF = """((part) => document.querySelector(`#parts-list .card:has([value="${part}"])`)
@@ -100,7 +100,7 @@ def test_arrow_keys_turn_a_ring_and_shift_takes_15_degrees_at_once(browser: Brow
     assert told_by(browser, "x") == "90 degrees"
     arrow_up(browser, "keyup")
     browser.wait(TURNED)
-    browser.wait("$('size-z').value === '10.00' && $('size-y').value === '40.00'")  # a T of 40 x 10 x 40 mm, laid on its back
+    browser.wait("$('size-z').value === '10.00' && $('size-y').value === '40.00'")  # a T of 40 x 10 x 40 mm, lying on its back
 
 
 def test_a_typed_side_scales_the_model_and_one_that_the_machine_does_not_reach_is_told(browser: Browser, bench: Running) -> None:
@@ -140,7 +140,7 @@ def test_parts_drawn_apart_tell_their_support_and_are_chosen_by_a_click(browser:
     )
     heights = (top + share * height for share in np.arange(0.05, 0.95, 0.05))
     met = next(chosen for y in heights if (chosen := part_at(browser, left + width / 2, y)))
-    assert met == "2"  # from above downwards the part that was lifted off comes first
+    assert met == "2"  # from above, the part lifted off is met first
     assert browser.value("$('parts-list').querySelector(':checked').value") == "2"
     browser.click("#parts-list input[value='1']")
     browser.value(f"{MENU_OF}(2)")
@@ -170,7 +170,7 @@ def test_another_bench_has_a_page_of_its_own_and_is_closed_in_the_list(browser: 
 
 
 def part_at(browser: Browser, x: float, y: float) -> str | None:
-    """The part that is chosen after a click."""
+    """The part that is chosen by a click."""
     browser.press(x, y)
     chosen: str | None = browser.value("$('parts-list').querySelector(':checked')?.value")
     return chosen

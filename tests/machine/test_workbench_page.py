@@ -1,4 +1,4 @@
-"""The workbench in a real browser: from a file to a saved plan that the command line cuts to the same parts."""
+"""The workbench in a real browser: from a file to a saved plan that the command line cuts into the same parts."""
 
 import json
 from pathlib import Path
@@ -20,12 +20,12 @@ FOUND = "!document.documentElement.hasAttribute('data-searching') && !document.b
 SHARES_DRAWN = """[...$('laid').querySelectorAll('canvas')].map((canvas) => {
   const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
   return data.filter((_, k) => k % 4 === 3).reduce((sum, alpha) => sum + (alpha > 0), 0) / (canvas.width * canvas.height); })"""
-UNITS = ["in metres", "in inches", "in centimetres"]  # that make it a size to print, the likeliest first
+UNITS = ["in metres", "in inches", "in centimetres"]  # units that give it a printable size, the likeliest first
 IDLE = "document.documentElement.dataset.busy === ''"
 
 
 def choose(browser: "Browser | Firefox", name: str, content: bytes, field: str = "file") -> None:
-    """A file chosen as a person does, and shown."""
+    """Choose a file as the user does and wait until it is shown."""
     browser.value(
         f"""{{ const bytes = Uint8Array.from({list(content)}), chosen = new DataTransfer();
         chosen.items.add(new File([bytes], {json.dumps(name)}));
@@ -37,7 +37,7 @@ def choose(browser: "Browser | Firefox", name: str, content: bytes, field: str =
 
 def open_model(browser: Browser, bench: Running, name: str, content: bytes) -> None:
     browser.open(bench.address)
-    browser.wait(f"document.documentElement.dataset.version && {IDLE}")  # all of what lies there is shown
+    browser.wait(f"document.documentElement.dataset.version && {IDLE}")  # the present bench is shown completely
     before, root = browser.value("document.documentElement.dataset.version"), "document.documentElement.dataset"
     choose(browser, name, content)
     opened = f"$('title').textContent === {json.dumps(name)} && $('undo').ariaLabel.startsWith('undo: open')"
@@ -57,7 +57,7 @@ def saved(browser: Browser | Firefox, button: str) -> str:
 
 
 def find_as_it_lies(browser: Browser | Firefox) -> None:
-    """Parts found, the model not laid down."""
+    """Find parts without changing the orientation."""
     browser.click("#tab-parts")
     browser.value("$('orient').checked = false")
     browser.click("#find")
@@ -98,7 +98,7 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     assert browser.value("$('legend').textContent") != ""
     drag_slider(browser, "front", 0, "input")
     assert browser.value("$('front-told').querySelector('dd').textContent") == "1"
-    with bench.line() as second_page:  # whose news moves neither the slider nor the picture under the hand
+    with bench.line() as second_page:  # its changes move neither the slider nor the picture that the user drags
         second_page.do("set", key="process.infill_density", value="1")
         second_page.until(lambda state: not state["priced"])
         priced = second_page.until(lambda state: state["priced"])
@@ -114,20 +114,20 @@ def test_another_row_of_the_front_is_shown_at_once_and_taken_when_the_slider_is_
     browser.value("{ WebSocket.prototype.send = sending; }")
     drag_slider(browser, "front", 0, "change")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: take another number of parts'")
-    browser.key("1")  # a view, not a step
+    browser.key("1")  # it selects a view, not a step
     browser.click("#undo")
     browser.wait("$('front').value === $('front').max && !$('redo').disabled")
     note = "{ text: 'one part would do', parts: 1 }"
     noted = f"modules['page/store'].update({{ state: {{ ...modules['page/store'].store.state, notes: [{note}] }} }})"
     words = "$('front-notes').innerText"
-    words = browser.value(f"({noted}, [{words}, $('front-notes').querySelector('button').click()][0])")  # before other news
+    words = browser.value(f"({noted}, [{words}, $('front-notes').querySelector('button').click()][0])")  # before other updates
     assert words.split("\n")[-1].endswith("Choose 1 part")
     browser.wait("$('front').value === '0' && $('undo').ariaLabel === 'undo: take another number of parts'")
     browser.click("#undo")
     browser.wait("$('front').value === $('front').max && !$('redo').disabled")
     assert "oriented on" not in browser.value("$('front-notes').textContent")
     with bench.line() as second_page:
-        second_page.do("set", key="search.seam_mm", value="100")  # too dear to be cut
+        second_page.do("set", key="search.seam_mm", value="100")  # too expensive to cut
         second_page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
     browser.click("#orient")
     browser.value("$('ranker').value = 'learned'")
@@ -228,16 +228,16 @@ def test_work_that_takes_longer_than_a_moment_tells_how_long_it_is_under_way(bro
     browser.open(bench.address)
     browser.wait(f"document.documentElement.dataset.version && {IDLE}")
     under_way = "(({ store, update }) => update({ state: { ...store.state, busy: 'reading big.stl' } }))(modules['page/store'])"
-    at_once = f"({under_way}, [$('summary').textContent, $('summary').dataset.elapsed])"  # before news from the server
+    at_once = f"({under_way}, [$('summary').textContent, $('summary').dataset.elapsed])"  # before updates from the server
     assert browser.value(at_once) == ["reading big.stl …", ""]
-    browser.wait(f"({under_way}, /^ [2-9]s$/.test($('summary').dataset.elapsed))")  # again after news that still come
+    browser.wait(f"({under_way}, /^ [2-9]s$/.test($('summary').dataset.elapsed))")  # again after updates that are still arriving
 
 
 def test_a_typed_angle_turns_the_model_and_its_size_is_that_of_how_it_stands(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "typed.stl", stl(tee()))
     browser.click("#tab-model")
     drag_slider(browser, "turn-x-typed", 90, "input")
-    browser.wait("$('model-told').textContent.includes('40.0 × 40.0 × 10.0 mm')")  # while it turns
+    browser.wait("$('model-told').textContent.includes('40.0 × 40.0 × 10.0 mm')")  # while it rotates
     drag_slider(browser, "turn-x-typed", 90, "change")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: lay the model down' && $('turn-x-typed').value === '0'")
     browser.wait("$('model-told').textContent.includes('40.0 × 40.0 × 10.0 mm') && $('size-z').value === '10.00'")
@@ -249,8 +249,8 @@ def test_the_face_that_is_clicked_lies_on_the_platform(browser: Browser, bench: 
     browser.click("[data-view=top]")
     browser.click("#fit")
     browser.click("#lay")
-    browser.wait("$('rings').hasAttribute('hidden')")  # one of them goes through the middle
-    browser.wait("modules['page/store'].store.facets?.facets.length === 6")  # of the hull of a T; no part of its arms' undersides
+    browser.wait("$('rings').hasAttribute('hidden')")  # one of the rings crosses the middle
+    browser.wait("modules['page/store'].store.facets?.facets.length === 6")  # of the hull of a T; none below its arms
     browser.press(*browser.middle("#canvas"))
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: lay a face down'")
     assert area(browser) == 0.0  # upside down a T needs no support
@@ -267,7 +267,7 @@ def test_a_plane_is_dragged_with_its_figures_and_one_that_cannot_be_cut_goes_bac
     assert browser.value("$('plane-offset').value") == "20.00"
     x, y = browser.middle("#hand-along")
     browser.hold((x, y), (x, y - 20))
-    browser.wait("document.documentElement.dataset.triedMs > 0")  # its figures, while the hand holds it
+    browser.wait("document.documentElement.dataset.triedMs > 0")  # its figures, during the drag
     browser.release((x, y - 20))
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: move a plane'")
     moved = float(browser.value("$('plane-offset').value"))

@@ -20,7 +20,7 @@ STOOD = "JSON.stringify(modules['page/store'].store.state.place_mm)"
 
 def open_in_the_middle(browser: Browser, bench: Running, name: str) -> None:
     open_model(browser, bench, name, stl(tee()))
-    browser.click("#place-middle")  # another test may have left it elsewhere
+    browser.click("#place-middle")  # another test may have moved it
     waits_for_place(browser, 0, 0)
     browser.wait("!$('hand-place').hidden")
 

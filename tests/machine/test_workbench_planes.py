@@ -1,5 +1,5 @@
-"""Planes by hand on the workbench's page: the neck nearby, the head that would touch, what is left alone, the others found, and a
-page that goes while a plane is in its hand."""
+"""Planes by hand on the workbench's page: a neck nearby, collisions of the head, protected areas, finding the other planes, and
+a page that closes during a drag."""
 
 import json
 import zipfile
@@ -82,7 +82,7 @@ def test_marks_are_in_the_plan_of_the_command_line_and_planes_that_they_forbid_a
         page.do("slice")
         refused = f"part 3 cannot be cut off: {why}: move or remove its plane, or find parts again"
         assert page.until(lambda state: state["problem"])["problem"] == refused
-        page.do("move", part=2, **LEVEL, offset_mm=21.0)  # the others are moved all the same
+        page.do("move", part=2, **LEVEL, offset_mm=21.0)  # the other planes can still be moved
         state = page.until(lambda state: state["cuts"][0]["offset_mm"] == 21.0)
         assert page.until(lambda state: state["invalid"] == ["", why])["problem"] == ""
         page.do("undo")
@@ -294,7 +294,7 @@ def test_faces_and_boxes_are_marked_by_clicks_moved_and_taken_away(browser: Brow
         browser.key("Escape")
         assert browser.value("$('mark-faces').getAttribute('aria-pressed')") == "false"
         browser.click("#mark-faces")
-        browser.click("#tab-model")  # where nothing is marked, so a click there marks nothing
+        browser.click("#tab-model")  # marks have no effect on this tab, so a click there marks nothing
         assert browser.value("$('notice').hidden")
         browser.click("#tab-parts")
         browser.click("#marks input[type=radio]")
@@ -388,7 +388,7 @@ def test_the_chosen_plane_is_seen_through_a_thick_model_and_about_it(browser: Br
         opened(page, bench, "tee.stl")
         added(page, 20.0)
         looked_at(browser, bench, "tee.stl")
-        browser.click("[data-view='top']")  # the arms hide what is cut
+        browser.click("[data-view='top']")  # the arms hide the cut
         browser.value("$('handles').style.visibility = $('plane-tools').style.visibility = 'hidden'")
         browser.click("#parts-list input[value='1']")
         before, drawn = pixels(browser).astype(int), browser.value("document.documentElement.dataset.drawn")
@@ -425,7 +425,7 @@ def test_earlier_work_is_opened_with_a_plane_that_its_mark_forbids(bench: Runnin
         opened(page, bench, "glass.stl")
         work = json.loads(bench.ask("kept")[1])[0]
         assert work["name"] == "tee.stl"
-        status, picture = bench.ask(f"kept/{work['key']}/picture")  # the whole model, as a plane cannot be cut
+        status, picture = bench.ask(f"kept/{work['key']}/picture")  # the whole model, because a plane cannot be cut
         assert (status, colours_in(picture)) == (200, set())
         assert bench.ask(f"kept/{work['key']}", "POST", b"", Origin=f"http://127.0.0.1:{bench.port}")[0] == 200
         state = page.until(lambda state: state["model"]["name"] == "tee.stl" and any(state["invalid"]))
@@ -543,6 +543,6 @@ def test_on_a_phone_the_offset_of_a_plane_is_shown_whole(browser: Browser, bench
             "text.textContent = '-127.14'; document.body.append(text); const width = text.offsetWidth; text.remove();"
             "return [field.clientWidth - 2 * parseFloat(style.paddingLeft), width, style.appearance]; })()"
         )
-        assert (room_px >= text_px, buttons) == (True, "textfield")  # without the buttons that step it, which cover its end
-        assert browser.value("$('plane-tools').offsetHeight < 90")  # still one row, and one of figures
+        assert (room_px >= text_px, buttons) == (True, "textfield")  # without the step buttons, which cover the end of the field
+        assert browser.value("$('plane-tools').offsetHeight < 90")  # still one row of tools and one of figures
         browser.resize(1280, 800)

@@ -1,4 +1,4 @@
-"""Several models on the plate of the workbench in a real browser: added, drawn, counted, taken away and kept."""
+"""Several models on the plate of the workbench in a real browser: added, drawn, counted, removed and kept."""
 
 import pytest
 
@@ -51,7 +51,7 @@ def test_a_model_is_added_drawn_counted_taken_off_the_plate_and_there_after_a_re
 
 
 def red_share(browser: Browser) -> float:
-    """How much of the picture is as red as models without a place."""
+    """The share of the picture in the red of models without a place."""
     red, green, blue = (pixels(browser)[:, :, channel].astype(int) for channel in range(3))
     return float(((red > 130) & (green < 70) & (blue < 70)).mean())
 

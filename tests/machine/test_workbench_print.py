@@ -1,4 +1,4 @@
-"""The workbench prints: what is refused, who commands, and what is sent, on the simulated printer."""
+"""Printing from the workbench on the simulated printer: refusals, control by one page, and the commands sent."""
 
 import json
 import re
@@ -23,7 +23,7 @@ from tests.machine.prints import commands_sent, kinds_of_fields, prints_line
 from tests.machine.running_workbench import QUICK, Running, workbench
 from tests.shapes import box
 
-# The process of a print asks its server often.
+# The process of a print queries its server often.
 HASTY = """
 from machine.workbench.printing import running_print
 running_print.MAIN = f"from machine.printing.servers import follow; follow.POLL_S = 0.1; {running_print.MAIN}"
@@ -40,7 +40,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def key() -> Iterator[None]:
-    """The key of the print server's stand-in, where the workbench and the command line look for it."""
+    """The key of the print server's stand-in, in the environment of the workbench and the command line."""
     with pytest.MonkeyPatch.context() as environment:
         environment.setenv(VARIABLE, KEY)
         yield
@@ -48,7 +48,7 @@ def key() -> Iterator[None]:
 
 @pytest.fixture(scope="module")
 def sliced(folder: Path, key: None) -> Iterator[Running]:
-    """A workbench on which a little box is sliced in one piece."""
+    """A workbench on which a small box is sliced in one piece."""
     with workbench(*QUICK, before=HASTY) as running:
         with running.line() as page, prints_line(running, "first") as printing:
             printing.do("check", port="sim")
@@ -89,7 +89,7 @@ def test_what_is_no_journal_is_told(sliced: Running, journal: str, sentence: str
 
 
 def listen_to_nothing(running: Running) -> socket.socket:
-    """A page's line to the prints that is opened and never read."""
+    """A page's connection to the prints that is opened and never read."""
     own = socket.create_connection(("127.0.0.1", running.port))
     own.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1024)
     own.sendall(
@@ -141,7 +141,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         browser.click("#pause")
         browser.wait(f"{PRINTING} === 'printing'")
 
-        browser.open(sliced.address)  # loaded again it still commands its print
+        browser.open(sliced.address)  # a reloaded page still controls its print
         browser.wait(f"{PRINTING} === 'printing' && !$('run-commands').hidden && $('held').hidden")
         browser.click("[data-babystep='0.05']")
         browser.wait("$('offset-told').textContent === '+0.05 mm'")
@@ -149,15 +149,15 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         second_page.command("take")
         browser.wait("!$('held').hidden && $('run-commands').hidden")
         assert "Another page has taken control" in browser.value("$('notice').textContent")
-        browser.open(sliced.address)  # the page that has begun it is gone, the print is not
+        browser.open(sliced.address)  # the page that started the print is gone, the print is not
         browser.wait(f"{PRINTING} === 'printing' && !$('print-bar').hidden")
         assert json.loads(browser.value("JSON.stringify([$('run-commands').hidden, $('held').hidden])")) == [True, False]
         browser.click("#tab-printing")
-        second_page.command("pause")  # so that it is not done before it is stopped, however slow this computer
+        second_page.command("pause")  # so that it is not done before it is stopped, even on a slow computer
         browser.wait(f"{PRINTING} === 'paused'")
         second_page.do("check", port="/dev/none")
         browser.wait("$('which').options.length === 2")
-        assert browser.value(PRINTING) == "paused"  # the print that is looked at stays, and so does the one that the button stops
+        assert browser.value(PRINTING) == "paused"  # neither the print shown nor the one that the button stops has changed
         second_page.until(lambda seen: seen["is_over"])
         second_page.command("forget")
         second_page.until(lambda seen: seen["state"] == "paused")
@@ -172,7 +172,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         assert typed == ["number", "search", "select-one", "text", "textarea"]
         assert not set(typed) & set(stopping)
         browser.value(f"{VIEW}.querySelector('button').focus()")
-        sliced.process.send_signal(signal.SIGSTOP)  # the workbench hangs while somebody presses the key
+        sliced.process.send_signal(signal.SIGSTOP)  # the workbench hangs while the user presses the key
         try:
             browser.key("e")
             browser.key("e")
@@ -191,7 +191,7 @@ def test_a_page_prints_another_watches_takes_over_and_every_key_e_stops_the_mach
         assert "M112" in commands_sent(Path(second_page.until(lambda seen: seen["is_over"])["log"]))
         second_page.command("forget")
         browser.wait(f"{PRINTING} === ''")
-        assert browser.value("$('stop-words').checkVisibility()")  # until it is noted, whatever becomes of the print
+        assert browser.value("$('stop-words').checkVisibility()")  # until it is noted, even after the print is removed
         assert browser.complaints == []
 
 
@@ -212,7 +212,7 @@ def test_on_a_phone_nothing_covers_print_now_and_a_print_is_followed_in_a_pictur
         browser.press(*browser.middle("#begin"))
         browser.wait(f"{PRINTING} === 'printing' && !$('follow').hidden")
         assert browser.value(on_top % "pause") == "pause"
-        browser.click("#cancel")  # asks first, and the emergency stop looks as it works meanwhile
+        browser.click("#cancel")  # asks for confirmation, during which the emergency stop looks enabled
         assert browser.value("getComputedStyle($('sure'), '::backdrop').backgroundColor") == "rgba(0, 0, 0, 0)"
         assert browser.value(on_top % "emergency") == "emergency"
         browser.click("#go-on")
@@ -258,7 +258,7 @@ def test_a_page_prints_on_a_print_server_finds_the_print_again_leaves_it_printin
         browser.click("#pause")
         browser.wait(f"{PRINTING} === 'paused' && $('pause').textContent === 'Resume'")
         assert (job.state, job.commands) == ("paused", ["M220 S150"])
-        browser.wait("$('feed-told').textContent === '150 %'")  # although this server does not tell it
+        browser.wait("$('feed-told').textContent === '150 %'")  # although this server does not report it
         second_page.until(lambda seen: seen.get("port") == address and seen["state"] == "paused")
         second_page.command("resume")
         assert second_page.refused() == "another page controls this print: take control first"
@@ -279,7 +279,7 @@ def test_a_page_prints_on_a_print_server_finds_the_print_again_leaves_it_printin
         type_port(browser, address)
         browser.click("#follow-server")
         browser.wait("$('run-title').textContent.startsWith('box.stl.gcode on octoprint:') && !$('run-commands').hidden")
-        browser.wait("/nozzle209.6 of 210 .C.*elapsed/.test($('run-told').textContent)")  # told with the first answer
+        browser.wait("/nozzle209.6 of 210 .C.*elapsed/.test($('run-told').textContent)")  # reported with the first answer
         browser.click("#cancel")
         browser.click("#cancel-surely")
         browser.wait(f"{PRINTING} === 'over'")
@@ -305,7 +305,7 @@ def homed(printer: SimulatedPrinter) -> list[str]:
 def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_question_is_answered(
     sliced: Running, browser: Browser
 ) -> None:
-    cut = Fault("reset", at=265, unit="line")  # not in a lifted travel: its height would be in doubt
+    cut = Fault("reset", at=265, unit="line")  # not in a lifted travel, after which its height would be uncertain
     with SimulatedPrinter(load().machine, faults=[cut]) as printer, prints_line(sliced, "first") as page:
         page.do("check", port=printer.path)
         page.until(lambda seen: seen["state"] == "ready")
@@ -315,7 +315,7 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
         browser.open(sliced.address)
         browser.click("#tab-printing")
         browser.wait("document.documentElement.dataset.line === 'open'")
-        browser.wait("document.documentElement.dataset.printing === 'over'")  # which closes what is opened before
+        browser.wait("document.documentElement.dataset.printing === 'over'")  # this closes an earlier print that is open
         type_port(browser, printer.path)
         browser.click("#rest-field summary")
         browser.wait(f"document.querySelector(`#journals input[value={json.dumps(ended['journal'])}]`)")
@@ -397,7 +397,7 @@ def test_print_under_the_verdict_checks_at_the_printer_of_last_time_and_moves_an
         browser.click("#tab-slices")
         browser.wait("$('verdict-print').checkVisibility() && $('port-typed').value")
         browser.click("#look")
-        browser.click("#bar-print")  # the same as under the verdict
+        browser.click("#bar-print")  # also offered under the verdict
         browser.wait(f"{PRINTING} === 'ready' && $('begin').checkVisibility()")
         assert browser.value("$('port-typed').value") == printer.path
         assert (printer.record.events, printer.record.moves) == ((), 0)
@@ -408,7 +408,7 @@ def test_print_under_the_verdict_checks_at_the_printer_of_last_time_and_moves_an
 
 
 def test_ctrl_c_at_the_terminal_ends_the_print_first_with_its_heaters_off(sliced: Running) -> None:
-    """The last one: it ends the workbench of the others."""
+    """The last test: it ends the workbench of the others."""
     with SimulatedPrinter(load().machine, speed=20.0) as printer, prints_line(sliced, "first") as page:
         page.do("check", port=printer.path)
         page.until(lambda seen: seen["state"] == "ready")

@@ -1,4 +1,4 @@
-"""The workbench's picture under a hand in a real browser: a brush for marks, the section view, measuring, and where one looks."""
+"""The workbench's picture in a real browser: brushing marks, the section view, measuring, and the camera."""
 
 import json
 from typing import Any
@@ -26,11 +26,11 @@ def opened(browser: Browser, bench: Running, name: str, content: bytes) -> None:
     open_model(browser, bench, name, content)
     browser.click("[data-view=front]")
     browser.click("#fit")
-    pixels(browser)  # as it is drawn then
+    pixels(browser)  # as it will be drawn then
 
 
 def seen(browser: Browser, *place_mm: float) -> tuple[float, float]:
-    """Where a place of the platform's frame is in the window."""
+    """The position of a point of the plate's frame in the window."""
     places = f"""(() => {{
       const {{ left, top }} = $('canvas').getBoundingClientRect(), [x, y] = view.picture.placeOf({json.dumps(place_mm)});
       return [left + x, top + y];
@@ -81,7 +81,7 @@ def test_beside_the_model_a_brush_turns_the_view_and_a_second_finger_drops_its_s
     assert browser.value("view.camera.yaw") == yaw
     browser.touch(((x, y),), ((x + 30, y),))
     browser.wait(f"{STORE}.state.zones.length === 1 && {IDLE}")
-    browser.click("#mark-erase")  # a finger has no Shift
+    browser.click("#mark-erase")  # a touch screen has no Shift key
     browser.touch(((x, y),), ((x + 30, y),))
     browser.wait(f"!{STORE}.state.zones.length && {IDLE}")
     browser.click("#mark-erase")
@@ -98,12 +98,12 @@ def test_a_section_shows_flat_backs_and_what_it_takes_away_cannot_be_clicked(bro
     assert not (abs(whole.astype(int) - CUT_COLOUR) < 30).all(axis=2).any()  # no backs shine through at edges
     browser.key("x")
     browser.key("x")
-    assert browser.value("[$('section-along').value, $('section-flip').checked]") == ["y", True]  # it opens towards the eye
+    assert browser.value("[$('section-along').value, $('section-flip').checked]") == ["y", True]  # it opens towards the viewer
     cut = pixels(browser)
     assert (abs(cut.astype(int) - CUT_COLOUR) < 12).all(axis=2).mean() > 0.02
     assert browser.value("$('section-told').textContent") == "0.0 mm"
     browser.click("#measure")
-    browser.press(*seen(browser, 0, 0, 10))  # on the section itself, where nothing is to be measured
+    browser.press(*seen(browser, 0, 0, 10))  # on the section itself, where nothing can be measured
     assert browser.value("$('measure-path').getAttribute('d')") == ""
     browser.key("Escape")
     assert browser.complaints == []
@@ -150,7 +150,7 @@ def test_a_ring_turns_the_model_the_way_of_the_hand(browser: Browser, bench: Run
     browser.wait(f"document.documentElement.dataset.drawn > {before}")  # the rings with the model in view
     pixels(browser)
     (least, most), reach = browser.value(f"[view.picture.box(), 1.05 * {STORE}.triangles.reach_mm]")
-    angles = radians([10, 30, 50, 70])  # beside where rings meet
+    angles = radians([10, 30, 50, 70])  # away from the places where rings meet
     around = {
         "x": (0 * angles, cos(angles), sin(angles)),
         "y": (sin(angles), 0 * angles, cos(angles)),

@@ -1,4 +1,4 @@
-"""Settings on the workbench in a real browser: of all parts and of one, refused beside their field, and what a front bears."""
+"""Settings on the workbench in a real browser: for all parts and for one, refused beside their field, and used by a front."""
 
 import json
 import shlex
@@ -100,7 +100,7 @@ def test_settings_are_found_by_other_slicers_words_and_taken_back_by_the_profile
         assert key in browser.value(keys)
     browser.value("{ $('search-settings').value = 'modifiers'; $('search-settings').dispatchEvent(new Event('input')); }")
     assert "Parts lists them under Protected areas" in browser.value("$('modifier-help').innerText")
-    assert browser.value("$('settings-count').textContent") == ""  # the help alone, not that no setting matches
+    assert browser.value("$('settings-count').textContent") == ""  # only the help, and no message that no setting matches
     browser.click("#level-advanced")
     assert browser.value("$('ranking').checkVisibility()")
     browser.click("#level-simple")
@@ -122,7 +122,7 @@ def test_settings_are_found_by_other_slicers_words_and_taken_back_by_the_profile
     browser.value("document.querySelector('#axes [data-end=\"-y\"]').dispatchEvent(new Event('click'))")
     axis = "document.querySelector('#axes [data-end=x]').getAttribute('transform')"
     browser.wait(f"{axis} === 'translate(26.0 0.0)'")
-    browser.open(bench.address)  # the same tab, groups and view when the page is loaded again
+    browser.open(bench.address)  # tab, groups and view are kept when the page is reloaded
     browser.wait(
         f"{keys}.length && !{keys}.includes('process.walls') && !$('settings').hidden && {axis} === 'translate(26.0 0.0)'"
     )
@@ -149,7 +149,7 @@ def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_comm
     browser.wait(changed("machine.gcode.before_part"))
     field = "document.querySelector('[data-key=\"machine.gcode.after_part\"] textarea')"
     browser.value(f"{{ {field}.focus(); {field}.value = 'M300'; {field}.dispatchEvent(new Event('input')); }}")
-    with bench.line() as second_page:  # of whose news a field that is typed in hears nothing
+    with bench.line() as second_page:  # its changes do not reach a field in which the user types
         second_page.do("set", key="machine.gcode.after_part", value="M18")
         second_page.until(lambda state: state["undo"] == "set machine.gcode.after_part")
     browser.wait("$('command-line').textContent.includes('M18')")

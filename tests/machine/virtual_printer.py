@@ -1,6 +1,6 @@
-"""A simulated printer in memory on a clock of its own, and random faults for it.
+"""A simulated printer in memory with its own clock, and random faults for it.
 
-A print of hours takes seconds and is the same at every run.
+A print of hours takes seconds and every run is the same.
 """
 
 import random
@@ -18,21 +18,21 @@ from machine.simulator.record import Record
 from profiles.errors import PortError
 from profiles.machine import Machine
 
-TURN_S = 1e-4  # what a turn of the host takes: time passes even where an answer is always there
+TURN_S = 1e-4  # duration of a turn of the host: time passes even if an answer is always ready
 PATH = "virtual"
-LINE_BYTES = 36  # of a stroke on the wire, so that byte faults fall among the lines
-MOST_S = 3.0  # that random delays and stalls last
-HEALED: tuple[Kind, ...] = (*BYTE_KINDS[:3], *OK_KINDS, "spurious resend")  # what a sender can heal without stopping
+LINE_BYTES = 36  # of a stroke on the wire, so that byte faults hit the lines
+MOST_S = 3.0  # maximum duration of random delays and stalls
+HEALED: tuple[Kind, ...] = (*BYTE_KINDS[:3], *OK_KINDS, "spurious resend")  # a sender recovers from these without stopping
 
 
 class EndlessError(Exception):
-    """More virtual time has passed than was given."""
+    """The permitted virtual time is over."""
 
 
 class VirtualPrinter:
     """`print_lines(lines, PATH, medium=printer.medium)`: the host's time is this printer's, and passes only while the host waits.
 
-    faults, baud, table: as of SimulatedPrinter. Beyond most_s the host is stopped with EndlessError: it hangs.
+    faults, baud, table: see SimulatedPrinter. After most_s the host is stopped with EndlessError, because it hangs.
     """
 
     def __init__(
@@ -53,7 +53,7 @@ class VirtualPrinter:
 
     @property
     def record(self) -> Record:
-        """What has been executed so far."""
+        """The record of the moves executed until now."""
         return self.firmware.record()
 
     def _open(self, name: str, baud: int) -> "_Line":
@@ -69,7 +69,7 @@ class VirtualPrinter:
             raise EndlessError(f"{self._most_s:g} s of virtual time are over")
 
     def exchange(self, data: bytes, seconds: float) -> bytes:
-        """Hand bytes over and let at most so much time pass until something comes; OSError while the cable is out."""
+        """Send bytes and wait up to this number of seconds for an answer; OSError while the cable is unplugged."""
         end_s = self.now_s + seconds
         self._pass(TURN_S)
         received = self._exchange_now(data)
@@ -80,7 +80,7 @@ class VirtualPrinter:
 
     @property
     def blocked(self) -> bool:
-        """Whether the printer reads nothing, so that writing comes to a halt."""
+        """Whether the printer reads nothing, so that writing blocks."""
         return self._cable.blocked(self.now_s) and not self.firmware.has_ring
 
     def _exchange_now(self, data: bytes) -> bytes:
@@ -108,12 +108,12 @@ class _Line:
         self._received += self._exchange(data, 0.0)
 
     def read(self) -> bytes:
-        """The bytes that have come; waits up to READ_S for the first."""
+        """The bytes received; waits up to READ_S for the first."""
         received, self._received = self._received, b""
         return received or self._exchange(b"", READ_S)
 
     def discard(self) -> None:
-        """Nothing is held back."""
+        """Nothing is buffered."""
 
     def close(self) -> None:
         """Bytes that come while the port is closed are lost."""
@@ -132,10 +132,10 @@ class _Line:
 def random_script(
     seed: int, count: int, lines: range, kinds: Sequence[Kind] = KINDS, line_bytes: int = LINE_BYTES
 ) -> FaultScript:
-    """`count` faults of these kinds at random places of those lines, the same for the same seed.
+    """`count` faults of these kinds at random places of those lines, reproducible by the seed.
 
-    line_bytes: how long a line is on the wire, so that byte faults fall among them. Answers are taken to be half as long. One in
-    eight of stalls, blocks and disconnections lasts for ever.
+    line_bytes: length of a line on the wire, so that byte faults hit the lines. Answers are assumed to be half as long. One in
+    eight of the stalls, blocks and disconnections lasts forever.
     """
     rng = random.Random(seed)
     return FaultScript(tuple(_random_fault(rng, rng.choice(kinds), lines, line_bytes) for _ in range(count)), seed)

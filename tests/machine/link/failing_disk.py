@@ -1,4 +1,4 @@
-"""A disk that fails under one file: a real small one where it can be mounted, otherwise what the system says of such a disk."""
+"""A disk that fails: a real small file system if one can be mounted, otherwise simulated system errors for one file."""
 
 import errno
 import os
@@ -16,7 +16,7 @@ from machine.link.journal import Checkpoint, Journal
 
 @contextmanager
 def small_disk(folder: Path) -> Iterator[Callable[..., bool]]:
-    """A file system of 330 kB at a folder, where one can be mounted; yields mount(*options), which says whether it could."""
+    """Mount a file system of 330 kB at a folder, if possible; yields mount(*options), which returns whether it succeeded."""
     folder.mkdir()
 
     def mount(*options: str) -> bool:
@@ -35,7 +35,7 @@ def small_disk(folder: Path) -> Iterator[Callable[..., bool]]:
 
 @contextmanager
 def full_disk(file: Path, mounted: bool) -> Iterator[None]:
-    """Meanwhile no file beside this one gets another byte; where no disk is mounted, none of this process exceeds its size."""
+    """Fill the disk of this file; if no disk is mounted, limit the size of every file of this process to the size of this one."""
     if mounted:
         filler = file.with_name("filler")
         with suppress(OSError), filler.open("wb", buffering=0) as out:
@@ -53,9 +53,9 @@ def full_disk(file: Path, mounted: bool) -> Iterator[None]:
 
 
 class FailingDisk:
-    """Of one file: lets so many writes and syncs through; then they fail with an error of the system, or (SHORT) write a part.
+    """Lets a number of writes and syncs of one file succeed; the next fail with a system error, or (SHORT) write only a part.
 
-    of: which of the two are counted, and fail.
+    of: which of the two operations count and fail.
     """
 
     SHORT = 0
@@ -100,13 +100,13 @@ class FailingDisk:
 
 
 def keep_notes_in(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Notes of incomplete journals are not those of the person who runs the tests."""
+    """Keep the notes of incomplete journals in `folder`, apart from those of the user who runs the tests."""
     monkeypatch.setattr(journals, "state_folders", lambda: (folder / "state",))
     monkeypatch.setattr(journals, "MEMORY", folder)
 
 
 def once_sent(monkeypatch: pytest.MonkeyPatch, line: int, act: Callable[[Path], object]) -> None:
-    """Something happens to the disk of a print when so many lines were sent."""
+    """Call `act` on a print's journal once this number of lines has been sent."""
     write, acted = Journal.write, set[Path]()
 
     def act_then_write(journal: Journal, checkpoint: Checkpoint, hurry: bool = False) -> None:

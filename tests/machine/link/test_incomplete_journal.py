@@ -1,4 +1,4 @@
-"""A journal that loses a record: it is refused from then on, wherever and however its disk fails."""
+"""A journal that loses a record is refused, wherever and however its disk fails."""
 
 import errno
 import os
@@ -100,7 +100,7 @@ def test_a_stick_that_is_removed_is_told_and_its_journal_refused_when_it_is_back
     with Journal(stick / "j", HEADING) as journal, pytest.MonkeyPatch.context() as monkeypatch:
         journal.write(at(16))
         journal.settle()
-        shutil.copytree(stick, drawer)  # what is on it, as long as nobody plugs it in
+        shutil.copytree(stick, drawer)  # the content of the drive while it is unplugged
         FailingDisk(monkeypatch, journal.path, 0, errno.EIO)
         stick.rename(tmp_path / "removed")
         assert "was deleted, moved or replaced" in journal.settle()

@@ -1,4 +1,4 @@
-"""The journal: whole records whatever a power cut tears, what is surely executed, bounded cost."""
+"""The journal: whole records after a power cut, the lines certainly executed, and bounded cost."""
 
 import json
 import os
@@ -50,7 +50,7 @@ def test_every_record_is_one_checked_line_of_text(tmp_path: Path) -> None:
 
 @pytest.fixture
 def restarted(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Callable[[], None]:
-    """Restarts the computer, as far as its journals can tell."""
+    """Simulates a restart of the computer by a new boot ID."""
     boot = tmp_path / "boot"
     boot.write_text("first\n")
     monkeypatch.setattr(journal_module, "BOOT_ID", boot)
@@ -74,7 +74,7 @@ def test_a_power_cut_that_tears_a_record_leaves_one_before_it(
         for line in range(16, 16 * records + 1, 16):
             journal.write(at(line))
             journal.settle()
-            journal.settle()  # with nothing new, as in a long pause
+            journal.settle()  # nothing new, as in a long pause
         damage(path, slot, b"!" + content[1:])
         story = read_journal(path)
     assert (story.torn, story.last in [at(16 * records), at(16 * records - 16), Checkpoint()]) == (1, True)
@@ -203,7 +203,7 @@ def test_a_state_has_the_word_in_the_file_that_it_always_had(state: PrintState, 
 def test_a_record_without_a_z_offset_reads_as_one_of_0_mm(tmp_path: Path) -> None:
     offsets = [at(4), replace(at(5), z_offset_mm=-0.05)]
     assert [read_journal(written(tmp_path / f"{k}", [moment])).last for k, moment in enumerate(offsets)] == offsets
-    assert b'"printing"]' in (tmp_path / "0").read_bytes()  # the record of earlier versions
+    assert b'"printing"]' in (tmp_path / "0").read_bytes()  # the format of earlier versions
 
 
 def test_a_record_says_that_the_firmware_cannot_change_the_z_offset(tmp_path: Path) -> None:
@@ -254,7 +254,7 @@ def test_a_journal_that_cannot_be_kept_is_one_sentence(monkeypatch: pytest.Monke
 
 
 def test_only_the_newest_journals_and_their_programs_are_kept(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # what prints before have left there is not counted
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))  # journals of earlier prints are not counted
     for number in range(KEPT + 3):
         with new_journal([f"G1 X{number}"], load(), f"model {number}") as journal:
             pass

@@ -1,4 +1,4 @@
-"""What counts as executed, from what the printer acknowledges and reports of its planner."""
+"""Counting executed lines from the printer's acknowledgements and its reports of free planner blocks."""
 
 from collections.abc import Iterator
 
@@ -12,7 +12,7 @@ MM = 2.0  # between the ends of moves
 
 
 def moves(count: int, step_mm: float = MM) -> Iterator[SentLine]:
-    """Commands of lines 1, 2, ..., wire numbers from 4 on, along X; every fourth moves nothing."""
+    """Commands of lines 1, 2, ..., with wire numbers from 4, along X; every fourth one does not move."""
     for line in range(1, count + 1):
         yield SentLine(line + 3, line, bool(line % 4), (step_mm * line, -2.0, 60.25, 30.0, 725.0, 12.34567))
 
@@ -35,7 +35,7 @@ def test_acknowledged_moves_are_executed_as_far_as_the_planner_has_room() -> Non
     st.lists(st.tuples(st.integers(0, 15), st.sampled_from([0.0, 0.03, -0.03, 0.08, -0.08, 0.2, 2.0])), min_size=1, max_size=60)
 )
 def test_what_counts_as_executed_never_holds_a_move_that_waits(steps: list[tuple[int, float]]) -> None:
-    """The planner is simulated: it holds at most 15 blocks, the oldest leave as many places as asked for, and a move of fewer
+    """The simulated planner holds at most 15 blocks, the oldest leave until the required places are free, and a move of fewer
     than 6 of 80 steps per mm is dropped and added to the next one, as in Marlin (MIN_STEPS_PER_SEGMENT).
     """
     history, blocks = LineHistory(), list[list[int]]()
@@ -109,7 +109,7 @@ def test_a_firmware_bounds_what_waits_where_its_answers_do_not_tell() -> None:
     for step in moves(40):
         history.send(step)
         history.acknowledge(step.number)
-    assert (history.acknowledged, history.executed) == (40, 40 - 27)  # 20 moves, and 6 commands among them that move nothing
+    assert (history.acknowledged, history.executed) == (40, 40 - 27)  # 20 moves, and 6 commands among them that do not move
 
 
 def test_the_history_of_a_mute_printer_stays_small() -> None:

@@ -1,4 +1,4 @@
-"""Sender and firmware joined in memory, both clocks virtual: many noisy prints in little time, the same ones every time."""
+"""Sender and firmware joined in memory with virtual clocks: many noisy, repeatable prints in a short time."""
 
 import random
 
@@ -20,11 +20,11 @@ MACHINE = load().machine
 MOVES = [f"G1 X{1 + i % 90}.{i:05d} Y{i % 70}.5 E0.{1 + i:05d} F3000" for i in range(300)]
 PROGRAM = ["M83", "M104 S200", "M109 S200", *MOVES, "M400", "M105"]
 WANTED = np.array([[float(word[1:]) for word in line.split()[1:4]] for line in MOVES])
-DOUBLED = {6}  # seeds whose faults double the ok of a torn line: nothing can heal that, and it is said
+DOUBLED = {6}  # seeds whose faults double the ok of a damaged line: this cannot be recovered, and it is reported
 
 
 def noisy_print(seed: int, faults: int, torn: bool) -> tuple[PrinterError | None, np.ndarray]:
-    """The error that ended a print, if one did, and the X, Y and filament of its moves; torn: bytes come in portions."""
+    """The error that ended a print, if any, and the X, Y and filament of its moves; torn: bytes arrive in portions."""
     rng, now_s = random.Random(seed), 0.0
     build = BuildOptions(advanced_ok=seed % 2 == 0, emergency_parser=seed % 3 > 0, busy=seed % 5 > 0)
     firmware, connection, left = SimulatedFirmware(MACHINE, build), Connection(), list(reversed(PROGRAM))

@@ -1,4 +1,4 @@
-"""Pause, overrides, user lines, cancel, emergency stop, a lost port: on a simulated printer whose time is its own."""
+"""Pause, overrides, user lines, cancel, emergency stop and a lost port, on a simulated printer with a virtual clock."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -31,11 +31,11 @@ BODY = [
 PROGRAM = [*START, *POSED, *BODY, "M104 S0", "M140 S0"]
 
 
-Act = Command | tuple[Any, ...] | Callable[[], object]  # what a person asks for: command, value, text
+Act = Command | tuple[Any, ...] | Callable[[], object]  # a request of the user: command, value, text
 
 
 class Watcher:
-    """Asks for things when the print has come to a line or a state, and remembers what was shown and sent."""
+    """Makes requests when the print reaches a line or a state, and records the status shown and the commands sent."""
 
     def __init__(self, printer: VirtualPrinter, profile: Profile = PROFILE, when: Mapping[str | int, Act] | None = None) -> None:
         self.printer, self.control, self.profile = printer, Control(), profile
@@ -78,7 +78,7 @@ def watched(when: Mapping[str | int, Act] | None = None, *faults: Fault, profile
 
 
 def strokes(printer: VirtualPrinter) -> np.ndarray:
-    """X, Y and pushed filament of the executed moves that push while they move across."""
+    """X, Y and extruded filament of the executed moves that extrude while they move in X or Y."""
     record = printer.record
     pushed = record.end[:, 5] - record.start[:, 5]
     rows = (pushed > 1e-9) & (record.end[:, :2] != record.start[:, :2]).any(axis=1)
@@ -91,13 +91,13 @@ def planned(program: list[str]) -> np.ndarray:
 
 
 def is_exact(watcher: Watcher) -> bool:
-    """Whether every stroke lies where the program wants it, in the real places of the axes."""
+    """Whether every stroke is where the program places it, by the real positions of the axes."""
     return bool(np.abs(strokes(watcher.printer) - planned(PROGRAM)).max() < 1e-6)
 
 
 @pytest.fixture(scope="module")
 def paused() -> Watcher:
-    """A print that was paused at line 150 and went on."""
+    """A print that was paused at line 150 and continued."""
     watcher = watched({150: Command.PAUSE, "paused": Command.RESUME})
     assert not watcher.run(PROGRAM).cancelled
     return watcher
@@ -115,7 +115,7 @@ def test_a_pause_at_a_tilted_pose_returns_to_the_same_pose_filament_feed_and_mod
 
 
 def filament_before_pause(lines: list[str]) -> float:
-    """The sum of the program's pushes up to the first M400."""
+    """The sum of the program's extrusions up to the first M400."""
     return sum(float(m[1]) for line in lines[: lines.index("M400")] if (m := re.search(r" E(\S+)$", line)))
 
 
@@ -261,7 +261,7 @@ def test_an_emergency_stop_without_answer_is_given_twice_and_says_to_cut_the_pow
 
 
 class _Tap:
-    """A wire that keeps what is written; what holds `deaf` does not arrive."""
+    """A wire that records the bytes written; those that contain `deaf` do not arrive."""
 
     def __init__(self, wire: Wire, written: list[bytes], deaf: bytes) -> None:
         self._wire, self._written, self._deaf, self.name = wire, written, deaf, wire.name
@@ -412,7 +412,7 @@ def test_a_port_that_stays_away_ends_the_print_in_bounded_time() -> None:
 
 
 class _Loose:
-    """A wire that takes nothing."""
+    """A wire that accepts nothing."""
 
     name = PATH
 

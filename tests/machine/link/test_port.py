@@ -1,4 +1,4 @@
-"""Ports: devices, socket:// and rfc2217:// behave the same way, and what goes wrong is a sentence."""
+"""Ports: devices, socket:// and rfc2217:// behave alike, and every failure is reported in one sentence."""
 
 import os
 import pty
@@ -35,7 +35,7 @@ PROGRAM = ["M83", *(f"G1 X{1 + i % 90}.{i:05d} Y{i % 70}.5 F3000" for i in range
 
 
 def heard(port: Port, length: int) -> bytes:
-    """The next bytes of a port; gives up after a minute of silence."""
+    """The next bytes of a port; fails after a minute of silence."""
     data, end_s = b"", monotonic() + PATIENCE_S
     while len(data) < length and monotonic() < end_s:
         data += port.read()
@@ -230,14 +230,14 @@ HOME = adapter("/dev/ttyACM0")
     (HOME, [adapter("/dev/ttyACM1")], "/dev/ttyACM1"),
     (HOME, [adapter("/dev/ttyACM1", socket_="3-2")], "/dev/ttyACM1"),  # plugged into another socket
     (HOME, [], None),
-    (HOME, [adapter("/dev/ttyACM0", number="9999")], None),  # another one of the same model has taken its name
+    (HOME, [adapter("/dev/ttyACM0", number="9999")], None),  # another device of the same model has taken its name
     (HOME, [adapter("/dev/ttyACM0", model="1a86:7523")], None),
-    (HOME, [adapter("/dev/ttyACM1", socket_="3-2"), adapter("/dev/ttyACM2")], "/dev/ttyACM2"),  # two with one number
+    (HOME, [adapter("/dev/ttyACM1", socket_="3-2"), adapter("/dev/ttyACM2")], "/dev/ttyACM2"),  # two devices with one number
     (HOME, [adapter("/dev/ttyACM1", socket_="3-2"), adapter("/dev/ttyACM2", socket_="3-3")], None),
     (adapter("/dev/ttyUSB0", ""), [adapter("/dev/ttyUSB1", "")], "/dev/ttyUSB1"),
     (adapter("/dev/ttyUSB0", ""), [adapter("/dev/ttyUSB0", "", socket_="3-2")], None),
     (adapter("/dev/ttyUSB0", ""), [adapter("/dev/ttyUSB0", "9999")], None),
-    (adapter("COM3", "", ""), [adapter("COM4", "", "")], None),  # neither number nor socket: the name is all there is
+    (adapter("COM3", "", ""), [adapter("COM4", "", "")], None),  # neither number nor socket: only the name is known
     (adapter("COM3", "", ""), [adapter("COM3", "", "")], "COM3"),
 ])  # fmt: skip
 def test_a_lost_adapter_is_found_by_its_serial_number_or_its_socket_and_no_other_is_taken_for_it(

@@ -1,4 +1,4 @@
-"""The states of a print: which may follow which, and what a page is told of a moment."""
+"""The states of a print, their permitted transitions, and the status that a page receives."""
 
 import ast
 import json
@@ -25,7 +25,7 @@ def test_every_state_has_a_row_and_can_be_reached_from_the_first() -> None:
 
 @pytest.mark.parametrize("state", sorted(PrintState))
 def test_a_print_can_end_in_every_way_whatever_it_is_at_and_stays_over(state: PrintState) -> None:
-    """What its process tells in quick succession is put together, so that any end may follow the first state."""
+    """States that follow each other quickly are merged into one report, so any end may follow the first state."""
     assert follows(state, state)
     if state not in OVER:
         assert all(follows(state, end) for end in OVER)

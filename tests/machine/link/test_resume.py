@@ -1,4 +1,4 @@
-"""Resuming: where a print goes on after its host or its printer has died, and the way back to it."""
+"""Resuming a print whose host or printer has died: the line to continue at, and the path back to it."""
 
 import json
 import re
@@ -52,18 +52,18 @@ PROGRAM = [*START, *part(1, 5, 15), *part(2, 30, 725), *part(3, -20, 360), "M104
 
 
 class KilledError(BaseException):
-    """The host is no more: nothing is done on its way out."""
+    """The host is killed: no cleanup runs."""
 
 
 class _Mortal:
-    """A wire whose host dies after so many writings: from then on nothing is sent and nothing heard."""
+    """A wire whose host dies after a number of writes; after that, nothing is sent or received."""
 
     def __init__(self, wire: Wire, writings: int) -> None:
         self._wire, self._left, self.name = wire, writings, wire.name
         self.discard, self.close = wire.discard, wire.close
 
     def write(self, data: bytes) -> None:
-        self._left -= b" M114*" not in data  # what only asks how many moves wait is no step of the print
+        self._left -= b" M114*" not in data  # a query for the number of waiting moves does not count
         if self._left < 0:
             raise KilledError
         self._wire.write(data)
@@ -120,7 +120,7 @@ def resumed(text: GcodeFile, printer: VirtualPrinter, story: JournalContents) ->
 
 
 def moved(printer: VirtualPrinter) -> np.ndarray:
-    """X Y Z A C of the ends and the filament of the executed moves."""
+    """X Y Z A C of the end points, and the filament, of the executed moves."""
     record = printer.record
     return np.column_stack([record.end[:, :5], record.end[:, 5] - record.start[:, 5]]).round(4)
 
@@ -151,7 +151,7 @@ def test_a_print_that_had_hardly_begun_begins_anew(text: GcodeFile, whole: np.nd
 
 
 def cold(text: GcodeFile, writings: int) -> tuple[VirtualPrinter, JournalContents, ResumePoint, list[str]]:
-    """The power goes for host and printer, and comes back."""
+    """The power of host and printer fails and comes back."""
     printer = VirtualPrinter(PROFILE.machine)
     story = killed(text, printer, writings)
     printer.firmware.reset()
@@ -233,7 +233,7 @@ def shifted_then_killed(text: GcodeFile, printer: VirtualPrinter) -> JournalCont
 
 
 def heights_of_strokes(printer: VirtualPrinter) -> set[float]:
-    """Where the axis Z really was in the strokes of the third part."""
+    """The real position of the Z axis in the strokes of the third part."""
     record = printer.record
     rows = (record.end[:, 5] - record.start[:, 5] > 1e-9) & (record.end[:, 3] == -20.0)
     return set(np.round(record.end[rows & (record.end[:, 0] != record.start[:, 0]), 2], 3).tolist())
@@ -347,7 +347,7 @@ def test_a_power_cut_at_any_line_never_resumes_beyond_what_was_executed(text: Gc
 def test_after_a_power_cut_few_moves_are_done_twice_and_the_height_is_known_while_it_prints(
     text: GcodeFile, line: int, advanced: bool
 ) -> None:
-    """15 blocks of the planner (BLOCK_BUFFER_SIZE 16 in Configuration_adv.h), four lines of no record, four lines in flight."""
+    """15 blocks of the planner (BLOCK_BUFFER_SIZE 16 in Configuration_adv.h), four lines not recorded, four lines in flight."""
     fault = FaultScript((Fault("reset", at=line, unit="line"),))
     printer = VirtualPrinter(PROFILE.machine, BuildOptions(advanced_ok=advanced), fault)
     with journal_of(text, "first") as journal, pytest.raises(FirmwareError):
@@ -360,7 +360,7 @@ def test_after_a_power_cut_few_moves_are_done_twice_and_the_height_is_known_whil
 
 
 class _Frozen:
-    """A wire whose printer reports a full planner whatever is in it."""
+    """A wire whose printer always reports a full planner."""
 
     def __init__(self, wire: Wire) -> None:
         self._wire, self.name, self.write = wire, wire.name, wire.write
@@ -397,7 +397,7 @@ def doubtful(text: GcodeFile, journal: Path, printer: SimulatedPrinter) -> None:
     assert main(["print", str(text.path), "--port", printer.path, "--journal", str(journal), "--force"]) == 1
 
 
-# The lines that the greeting, the questions and the barriers add put the cut where the tip rises.
+# The lines added by the greeting, the queries and the barriers place the cut where the tip rises.
 IN_DOUBT = [Fault("reset", at=PROGRAM.index("G0 Z62.2 F900") + 18, unit="line")]
 STOCK = BuildOptions(advanced_ok=False)
 
@@ -425,7 +425,7 @@ def test_the_height_that_a_person_sees_is_what_the_axis_is_called(
 
 
 class Person(StringIO):
-    """At a terminal."""
+    """Pretends to be a terminal."""
 
     def __init__(self, answers: list[str]) -> None:
         super().__init__("".join(f"{answer}\n" for answer in answers))
@@ -501,7 +501,7 @@ def with_block(profile: Profile, block: str) -> Profile:
     return profile.model_copy(update={"machine": profile.machine.model_copy(update={"gcode": gcode})})
 
 
-AT_HOME = {"X": -160.0, "Y": -160.0, "Z": 260.0, "A": -95.0, "C": -3600.0, "E": 0.0}  # what the real Marlin says after a reset
+AT_HOME = {"X": -160.0, "Y": -160.0, "Z": 260.0, "A": -95.0, "C": -3600.0, "E": 0.0}  # the real Marlin's answer after a reset
 
 
 def test_a_marlin_that_has_restarted_believes_itself_at_its_home_positions_and_is_resumed() -> None:

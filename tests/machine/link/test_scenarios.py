@@ -1,7 +1,7 @@
-"""What can go wrong on a serial line, one test for each entry of the list of 47 fault scenarios, by its number.
+"""Faults of a serial line: one test for each entry, by its number, of the list of 47 scenarios.
 
-Most are whole prints over the stream on a simulated printer with a virtual clock; where the scenario is about single words of
-the printer, the protocol is asked alone.
+Most tests stream whole prints to a simulated printer with a virtual clock; scenarios about single answers of the printer test
+the protocol alone.
 """
 
 import re
@@ -49,14 +49,14 @@ PLAIN = BuildOptions(advanced_ok=False)
 HEAT = ["M104 S200", "M109 S200", "G92 E0", "M83"]
 STROKES = [f"G1 X{20 + k % 60}.{k:03d} Y{30 + k % 41}.5 E0.{10000 + k:05d} F6000" for k in range(150)]
 PROGRAM = [*HEAT, *STROKES, "M104 S0"]
-LINE = 60  # the wire line that most faults hit
+LINE = 60  # the wire line that most faults affect
 STALL_S = 4.0
 BOTH = pytest.mark.parametrize("build", [BuildOptions(), PLAIN], ids=["advanced", "plain"])
 
 
 @dataclass
 class Print:
-    """One print: how it ended, and what travelled."""
+    """One print: how it ended, and the bytes in both directions."""
 
     printer: VirtualPrinter
     traffic: list[tuple[float, str, bytes]]
@@ -76,7 +76,7 @@ class Print:
         return b"".join(data for _, way, data in self.traffic if way == "<")
 
     def after(self, words: bytes) -> bytes:
-        """All bytes sent after these words were heard."""
+        """All bytes sent after these words were received."""
         index = next(k for k, (_, way, data) in enumerate(self.traffic) if way == "<" and words in data)
         return b"".join(data for _, way, data in self.traffic[index:] if way == ">")
 
@@ -107,7 +107,7 @@ def printed(
 
 
 def assert_exact(done: Print, whole: bool = True, strokes: Sequence[str] = STROKES) -> None:
-    """Every stroke of the program happened once and in order, or a beginning of them, the last perhaps cut short."""
+    """Every stroke of the program, or of its beginning, happened once and in order; the last one may be cut short."""
     assert (done.error is None) == whole, done.error
     record = done.record
     pushed, moved = record.end[:, 5] - record.start[:, 5], (record.end[:, :2] != record.start[:, :2]).any(axis=1)
@@ -129,24 +129,24 @@ def times(done: Print, number: int) -> int:
 
 @cache
 def clean(build: BuildOptions | None = None) -> Print:
-    """The print when nothing goes wrong."""
+    """The print without faults."""
     return printed(build=build)
 
 
 def wire(build: BuildOptions | None = None) -> bytes:
-    """What the host sends when nothing goes wrong."""
+    """The bytes that the host sends without faults."""
     return clean(build).sent
 
 
 def byte(line: int, offset: int = 0, build: BuildOptions | None = None) -> int:
-    """Where a byte of a wire line stands in the faultless stream; negative offsets count from its end."""
+    """The index of a byte of a wire line in the faultless stream; negative offsets count from the line's end."""
     stream = wire(build)
     begin = stream.index(b"\nN%d " % line) + 1
     return begin + offset if offset >= 0 else stream.index(b"\n", begin) + 1 + offset
 
 
 def answer(line: int, build: BuildOptions | None = None) -> int:
-    """Which of the printer's words, counted from 1, acknowledges a wire line that moves something."""
+    """Which ok of the printer, counted from 1, acknowledges a wire line that moves an axis."""
     done = clean(build)
     before = done.heard[: done.heard.index(b"ok T:")].count(b"\n")
     oks = [k for k, text in enumerate(done.heard.split(b"\n"), 1) if text.startswith(b"ok") and k > before]
@@ -231,7 +231,7 @@ def test_scenario_10_an_ok_doubled(build: BuildOptions) -> None:
 
 
 def assert_window(done: Print) -> None:
-    """Never more than 127 bytes beyond what the printer has said to have taken."""
+    """Never more than 127 bytes beyond those that the printer has acknowledged."""
     open_bytes: dict[int, int] = {}
     for _, way, data in done.traffic:
         for text in data.split(b"\n"):
@@ -381,7 +381,7 @@ def test_scenario_25_three_seconds_of_silence_then_all_answers_at_once(build: Bu
 
 
 def cancelled_at(done_after_s: float) -> tuple[Control, Callable[[float, str, bytes], None], list[float]]:
-    """Asks for the end once the clock has passed a time; the list gets that time."""
+    """Requests the end once the clock has passed a time, which it appends to the list."""
     control, asked = Control(), []
 
     def listen(now_s: float, way: str, data: bytes) -> None:
@@ -484,7 +484,7 @@ def test_scenario_32_an_emergency_stop_of_a_printer_that_reads_nothing() -> None
 
 
 class Halving:
-    """A wire that takes half of one writing, then fails once."""
+    """A wire that accepts half of one write, then fails once."""
 
     failed = False
 
@@ -520,7 +520,7 @@ def test_scenario_34_stalls_of_sixty_milliseconds_never_overflow_a_ring_of_128_b
 
 
 def test_scenario_35_short_segments_are_slowed_by_the_line_and_no_byte_is_lost() -> None:
-    """That the dry run predicts it, and how often the printer runs dry, is tested beside the dry run."""
+    """The tests of the dry run cover that it predicts this, and how often the printer runs dry."""
     strokes = [f"G1 X{20 + k / 10:.1f} Y30 E0.{10000 + k} F3600" for k in range(300)]
     paced = [printed(build=BuildOptions(rx_ring=128), lines=[*HEAT, *strokes], baud=baud) for baud in (9600, 115200, 1_000_000)]
     assert [done.record.underruns > 20 for done in paced] == [True, False, False]
@@ -581,7 +581,7 @@ def test_scenario_39_a_pause_comes_back_to_tilt_turn_filament_and_feed() -> None
 
 
 def journal_of(lines: Sequence[str], done_after: int, path: Path) -> tuple[int, int]:
-    """Lines that the journal says to be executed, and that were, when the power fails at a line."""
+    """The lines executed according to the journal, and those really executed, when the power fails at a line."""
     heading = JournalHeading("p.gcode", "0" * 64, "p", {})
     with Journal(path, heading) as journal:
         done = printed([Fault("reset", done_after)], lines=lines, journal=journal)

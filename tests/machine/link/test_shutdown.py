@@ -1,4 +1,4 @@
-"""Every way out leaves the heaters off: during homing, on a printer that halts, on one that insists on checksums."""
+"""Heaters are switched off on every exit: during homing, on a halted printer, on one that requires checksums."""
 
 from dataclasses import replace
 from threading import Event as Flag
@@ -120,7 +120,7 @@ def test_an_emergency_stop_of_a_klipper_is_confirmed() -> None:
     medium = watching(printer.medium, b"G1 X10", lambda: control.ask(Command.EMERGENCY_STOP))
     with pytest.raises(FirmwareError, match="emergency stop: the printer has halted; send FIRMWARE_RESTART"):
         print_lines(HOMING, PATH, control=control, medium=medium, profile=klipper)
-    assert emergency_stop(printer.medium.open(PATH, 0), printer.medium)  # once more: it answers M112 with a bare ok now
+    assert emergency_stop(printer.medium.open(PATH, 0), printer.medium)  # once more: it now answers M112 with a bare ok
 
 
 def test_a_firmware_that_insists_on_checksums_prints_and_is_switched_off_and_asked() -> None:
@@ -148,7 +148,7 @@ def test_an_insisting_firmware_without_an_emergency_parser_is_stopped_too() -> N
 
 
 class Wire:
-    """A printer that says one thing to whatever it is told."""
+    """A printer with one answer to everything."""
 
     name = "said"
 
@@ -156,7 +156,7 @@ class Wire:
         self._said, self.now_s = said, 0.0
 
     def write(self, data: bytes) -> None:
-        """Takes bytes and does nothing with them."""
+        """Accept bytes and ignore them."""
 
     def read(self) -> bytes:
         self.now_s += 0.1
@@ -164,7 +164,7 @@ class Wire:
         return said
 
     def discard(self) -> None:
-        """Nothing waits."""
+        """Nothing is waiting."""
 
     def close(self) -> None:
         """Nothing is open."""
@@ -187,17 +187,17 @@ def test_an_emergency_stop_is_confirmed_by_words_of_a_halt_only(said: bytes, hal
 
 
 class Old(Wire):
-    """A printer whose words from before the orders come in portions; to the orders it says nothing."""
+    """A printer whose words from before the orders come in portions; it does not answer the orders."""
 
     def __init__(self, *old: bytes) -> None:
         super().__init__(b"")
         self._old = iter(old)
 
     def write(self, data: bytes) -> None:
-        """Hear an order."""
+        """Receive an order."""
 
     def read(self) -> bytes:
-        """What it said before."""
+        """The next earlier words."""
         self.now_s += 0.02
         return next(self._old, b"")
 
@@ -221,10 +221,10 @@ def test_a_firmware_that_answers_every_question_with_missing_checksum_is_asked_w
 
 
 class Always(Wire):
-    """A printer that says the same at every turn."""
+    """A printer that says the same thing at every read."""
 
     def read(self) -> bytes:
-        """What it says."""
+        """The constant answer."""
         self.now_s += 0.02
         return self._said
 

@@ -30,7 +30,7 @@ from tests.machine.virtual_printer import HEALED, PATH, VirtualPrinter, random_s
 
 MACHINE = load().machine
 QUICK = replace(SERIAL, timing=Timing(stall_s=0.25, stall_mute_s=0.25, sync_s=1.0, drain_s=0.05, quiet_s=0.03))
-# Where nothing goes wrong nobody has to be asked again, however long a busy machine takes.
+# Without faults no query is repeated, however slow a busy machine is.
 PATIENT = replace(
     SERIAL, timing=Timing(stall_s=PATIENCE_S, stall_mute_s=PATIENCE_S, sync_s=PATIENCE_S, drain_s=0.05, quiet_s=0.03)
 )
@@ -40,12 +40,12 @@ OFF = ["M104 S0", "M140 S0"]
 
 
 def strokes(n: int) -> list[str]:
-    """n different moves, each with filament of its own."""
+    """n different moves, each with its own amount of filament."""
     return ["M83"] + [f"G1 X{1 + i % 90}.{i:05d} Y{i % 70}.5 E0.{1 + i:05d} F3000" for i in range(n)]
 
 
 def expected(lines: list[str]) -> np.ndarray:
-    """X, Y and pushed filament of the moves of a program of strokes()."""
+    """X, Y and extruded filament of the moves of a program of strokes()."""
     rows = [[float(word[1:]) for word in line.split()[1:4]] for line in lines if line.startswith("G1 X")]
     return np.array(rows).reshape(-1, 3)
 
@@ -55,7 +55,7 @@ def done(record: Record) -> np.ndarray:
 
 
 def assert_executed(record: Record, lines: list[str], whole: bool = True) -> None:
-    """The moves of the program happened exactly once and in order; all of them, or a beginning of them."""
+    """The moves of the program, all of them or a beginning, happened exactly once and in order."""
     got, wanted = done(record), expected(lines)
     assert len(got) == len(wanted) if whole else len(got) <= len(wanted)
     assert np.abs(got - wanted[: len(got)]).max(initial=0.0) < 1e-6
@@ -175,7 +175,7 @@ def test_a_stream_is_consumed_only_as_fast_as_it_is_printed() -> None:
 
 
 def _once_sent(count: int, act: Callable[[], object]) -> Callable[[PrintStatus], None]:
-    """A listener to a print that acts once, as soon as this number of commands is sent."""
+    """A listener to a print that acts once, as soon as this number of commands has been sent."""
     waiting = [act]
 
     def watch(progress: PrintStatus) -> None:

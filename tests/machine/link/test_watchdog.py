@@ -1,4 +1,4 @@
-"""The watchdog: heaters that stay away from their target, or of which nothing is heard, end a print; others do not."""
+"""The watchdog ends a print whose heaters stay away from their target or are not reported, and no other print."""
 
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -16,11 +16,11 @@ from profiles.profile import load
 from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 PROFILE = load()
-LAST_S = 598.0  # of the reports that watched() gives
+LAST_S = 598.0  # duration of the reports that watched() gives
 
 
 def watched(nozzle: Callable[[float], float], target_c: float = 200.0, seconds: int = 600, every_s: int = 2) -> PrinterReports:
-    """A watchdog that has seen a nozzle with a course of its own, and a bed at rest."""
+    """A watchdog that has seen a nozzle with the given temperature curve, and an idle bed."""
     watchdog = PrinterReports(0.0, (300.0, 110.0))
     for second in range(0, seconds, every_s):
         watchdog.read(Event(Kind.TEMPERATURE, temperature=Temperature(nozzle(second), target_c, 60.0, 60.0)), float(second))
@@ -32,7 +32,7 @@ def watched(nozzle: Callable[[float], float], target_c: float = 200.0, seconds: 
     lambda s: 200.0,
     lambda s: 20.0 + 0.31 * s,  # ten minutes to the target
     lambda s: 200.0 + 15.0 * (-1) ** (s // 2),  # a poor thermostat
-    lambda s: 260.0 - 0.3 * s if s < 200 else 200.0,  # cooling down to it
+    lambda s: 260.0 - 0.3 * s if s < 200 else 200.0,  # cooling down to the target
     lambda s: 150.0 if s % 100 < 50 else 200.0,  # a gust of air, and back in time
 ], ids=["steady", "slow", "swinging", "cooling", "gusts"])  # fmt: skip
 def test_a_heater_that_is_or_comes_near_its_target_is_left_alone(course: Callable[[float], float]) -> None:

@@ -1,4 +1,4 @@
-"""Babystepping: Z is shifted in the midst of a print, along the tool whatever the table's pose, and taken back at the end."""
+"""Babystepping: Z is shifted during a print, along the tool in every pose of the table, and restored at the end."""
 
 import re
 
@@ -24,7 +24,7 @@ FIRMWARES = [
 
 
 def heights(watcher: Watcher) -> set[float]:
-    """Where the axis Z really was in strokes."""
+    """The real position of the Z axis in strokes."""
     record = watcher.printer.record
     pushed = record.end[:, 5] - record.start[:, 5] > 1e-9
     return set(np.round(record.end[pushed, 2], 6).tolist())
@@ -91,7 +91,7 @@ def test_a_z_offset_that_was_taken_back_or_never_sent_is_not_reported_as_kept() 
 
 
 @pytest.mark.parametrize(("machine", "sentence"), [
-    ("generic_ac", ""),  # homing resets it
+    ("generic_ac", ""),  # homing resets the offset
     ("fractal5pro", "the printer keeps the Z offset of -0.05 mm: before another print send it SET_GCODE_OFFSET Z_ADJUST=0.050"),
 ])  # fmt: skip
 def test_a_cancelled_print_tells_of_a_z_offset_that_the_printer_keeps(machine: str, sentence: str) -> None:

@@ -1,4 +1,4 @@
-"""Before anything moves: printer, profile and program belong together, or one sentence says why not; on the real command line."""
+"""Checks before a print: printer, profile and program match, or one sentence of the command line reports why not."""
 
 import errno
 import grp
@@ -64,7 +64,7 @@ def printed(port: str, file: str, *options: str) -> int:
 
 
 def talking_at(rate: int) -> Words:
-    """A printer that understands one rate and at any other hears and says rubbish, as a UART does."""
+    """A printer that understands one rate and at any other receives and sends garbled bytes, as a UART does."""
     right = scripted(FIVE_AXES)
     return lambda data, baud: right(data, baud) if baud == rate else bytes(byte | 0x80 for byte in data) * 3
 
@@ -102,7 +102,7 @@ def test_what_is_no_fitting_printer_is_refused_with_one_sentence(
         assert printed(path, file_of(tmp_path, "G1 X1 F600")) == 1
     message = capsys.readouterr().err
     assert sentence.replace("PORT", path) in message
-    assert len([line for line in message.splitlines() if not line.startswith("compil")]) == 1  # as a first run may
+    assert len([line for line in message.splitlines() if not line.startswith("compil")]) == 1  # a first run may add it
 
 
 @pytest.mark.parametrize("rate", [230400, 1000000])
@@ -137,7 +137,7 @@ READY = "X:0.000 Y:0.000 Z:0.000 E:0.000\nok"
 
 
 def klipper(*places: str) -> Words:
-    """A Klipper that answers M114 as told, in turn, the last one again and again."""
+    """A Klipper that gives these answers to M114 in turn, and repeats the last one."""
     waiting = list(places)
 
     def answer(data: bytes, _baud: int) -> bytes:
@@ -193,7 +193,7 @@ def test_a_port_without_rights_names_the_group(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refused(*arguments: object, **options: object) -> None:
-        """What pyserial says of a port that the user may not open; to root every port is open."""
+        """The error of pyserial for a port that the user may not open; root may open every port."""
         raise serial.SerialException(errno.EACCES, f"could not open port {arguments[0]}: [Errno 13] Permission denied")
 
     with SimulatedPrinter(MACHINE) as printer:
@@ -314,7 +314,7 @@ def test_force_goes_past_another_firmware_and_says_so(capsys: pytest.CaptureFixt
 def test_a_klipper_without_a_macro_is_refused_unless_that_only_shows_a_message() -> None:
     klipper = Identity("", commands=frozenset({"G28", "M117"}))
     assert lacking_macros(klipper, ["SET_DISPLAY_TEXT MSG=hello", "HOME_AB"]) == ["HOME_AB"]
-    assert lacking_macros(Identity(""), ["HOME_AB"]) == []  # what it has is not known
+    assert lacking_macros(Identity(""), ["HOME_AB"]) == []  # its macros are not known
 
 
 @pytest.mark.parametrize("refuse", [check_free, check_idle])

@@ -1,4 +1,4 @@
-"""Print history: what the list of past prints has of prints that ended, failed, were killed or go on."""
+"""Print history: the entries of prints that ended, failed, were killed or are still running."""
 
 import json
 import subprocess
@@ -25,7 +25,7 @@ LINES = ("G21", "G90", "M83", "G1 X1 E1500 F600", "G1 X2 E500")
 
 @pytest.fixture(autouse=True)
 def times(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """The times that are told, one after the other."""
+    """The times that the clock returns, one after the other."""
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     told = [1000.0, 1090.0, 2000.0, 2005.0, 3000.0, 3001.0]
     monkeypatch.setattr(history, "time", lambda: told.pop(0))

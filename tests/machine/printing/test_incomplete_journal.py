@@ -1,4 +1,4 @@
-"""A print whose disk fails, from `print` to `resume`: told at once and at the end, refused or resumed where it was cut off."""
+"""A print whose disk fails, from `print` to `resume`: reported at once and at the end, then refused or resumed at the cut."""
 
 import errno
 import shutil
@@ -63,7 +63,7 @@ def resumed(printer: SimulatedPrinter, journal: Path, *options: str) -> int:
 def test_after_a_power_cut_on_a_disk_that_had_filled_up_the_print_goes_on_in_its_part_and_pose(
     program: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    journal, lines = tmp_path / "disk" / "journal", program_of(900)  # so many records are no longer in the last block of a file
+    journal, lines = tmp_path / "disk" / "journal", program_of(900)  # enough for records beyond the last block of a file
     program.write_text("\n".join(lines))
     with small_disk(tmp_path / "disk") as mount, cut_off_in_part_2(len(lines) - 60) as printer:
         mounted = mount("-o", "remount,rw")
@@ -84,7 +84,7 @@ def fails(number: int, after: int = 0, times: float = 1e9) -> Callable[[Path, py
 
 
 def seen_by_its_thread(action: object) -> None:
-    """Give the journal's thread, which syncs every SYNC_S, time to notice what was done."""
+    """Give the journal's thread, which syncs every SYNC_S, time to notice the action."""
     sleep(20 * journal_module.SYNC_S)
 
 
@@ -145,7 +145,7 @@ def test_an_incomplete_journal_is_not_offered(
 
 
 def half_printed(program: Path, journal: Path, printer: SimulatedPrinter) -> int:
-    """Cut off in part 2; the moves that were made."""
+    """Print until the cut in part 2; the number of moves made."""
     assert printed(program, printer, journal) == 1
     return len(printer.record.start)
 

@@ -1,4 +1,4 @@
-"""The journals of the state folder: whatever lies there ends no list with a traceback, and a print that runs is not offered."""
+"""The journals of the state folder: no content ends a list with a traceback, and a running print is not offered."""
 
 import json
 import os
@@ -126,7 +126,7 @@ def test_a_program_that_a_journal_begun_meanwhile_names_is_not_thinned_out(monke
     oldest = min(folder.glob("*.journal"))
     program = next(path for path in folder.glob("*.gcode") if path.name.startswith(oldest.stem))
 
-    def begin_another(path: Path) -> bool:  # as another process does, that resumes the oldest journal
+    def begin_another(path: Path) -> bool:  # like another process that resumes the oldest journal
         if not (folder / "further.journal").exists():
             (folder / "further.journal").write_bytes(oldest.read_bytes())
         return False

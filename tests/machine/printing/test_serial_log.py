@@ -1,4 +1,4 @@
-"""The serial log: whole lines with times, bounded, old ones deleted, and never in the way."""
+"""The serial log: whole lines with times, of bounded size, with old files deleted, and without delaying a print."""
 
 import re
 import threading
@@ -74,7 +74,7 @@ def test_the_newest_ten_logs_are_kept_each_with_its_pieces(tmp_path: Path, monke
     with new_log("console", "") as console:
         pass
     names = sorted(path.name for path in (tmp_path / "tiltprint" / "logs").iterdir())
-    assert oct(console.file.stat().st_mode & 0o777) == "0o600"  # what a person prints concerns nobody else
+    assert oct(console.file.stat().st_mode & 0o777) == "0o600"  # a log is private to the user
     assert oct(console.file.parent.stat().st_mode & 0o777) == "0o700"
     assert names == sorted([console.file.name, *(p.name for f in files[3:] for p in (f, piece_of(f, 1)))])
 

@@ -1,4 +1,4 @@
-"""The time left of a print whose lines stream to a printer."""
+"""The time left of a print whose lines are streamed to a printer."""
 
 import pytest
 

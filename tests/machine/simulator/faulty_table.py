@@ -7,7 +7,7 @@ from machine.simulator.contact import ProbedTable
 
 
 class FaultyTable(ProbedTable):
-    """silent_from, early_from: the probing moves, counted from 1, from which on the probe never triggers, or triggers at once."""
+    """From probing move number silent_from the probe never triggers, from early_from it triggers at once; counted from 1."""
 
     def __init__(self, *what: Any, silent_from: float = inf, early_from: float = inf, **more: Any) -> None:
         super().__init__(*what, **more)

@@ -1,4 +1,4 @@
-"""The simulated printer does what each serial dialect's own words say."""
+"""The simulated printer executes the special commands of each serial dialect."""
 
 from math import inf
 

@@ -1,4 +1,4 @@
-"""Fault scripts strike where they say, once or by chance, and a bad file is refused with a sentence."""
+"""Fault scripts: each fault occurs where the script says, once or by chance, and a bad file is refused with a sentence."""
 
 import re
 from itertools import islice, takewhile
@@ -26,7 +26,7 @@ PLAIN = BuildOptions(advanced_ok=False)
 
 
 class Heard(SimulatedFirmware):
-    """A firmware that keeps the bytes it gets."""
+    """A firmware that records the bytes it receives."""
 
     def __init__(self) -> None:
         super().__init__(MACHINE, PLAIN)
@@ -38,7 +38,7 @@ class Heard(SimulatedFirmware):
 
 
 def answers(*faults: Fault, lines: int = 3, now_s: float = 0.0) -> bytes:
-    """What the host hears to so many G21."""
+    """The bytes that the host receives in answer to a number of G21."""
     return Cable(SimulatedFirmware(MACHINE, PLAIN), FaultScript(faults)).exchange(b"G21\n" * lines, now_s)
 
 

@@ -1,4 +1,4 @@
-"""The simulated Marlin has the real one's behaviour: what its source and its measurements say, one by one."""
+"""The simulated Marlin behaves like the real one, rule by rule as in its source and in measurements."""
 
 from dataclasses import replace
 from math import inf
@@ -85,7 +85,7 @@ def test_a_line_over_95_characters_loses_its_checksum_however_often_it_is_sent(l
 
 
 def _numbered(length: int) -> bytes:
-    """A right line of that length, its checksum of two digits."""
+    """A valid line of this length, with a checksum of two digits."""
     bodies = (b"N1 M117 " + b"x" * (length - 12) + bytes([last]) for last in range(65, 91))
     return next(b"%s*%d" % (body, checksum(body)) for body in bodies if 10 <= checksum(body) < 100)
 
@@ -211,7 +211,7 @@ def test_a_reset_greets_and_begins_numbers_and_places_anew() -> None:
     assert (firmware.last_number, firmware.record().nozzle_target_c, firmware.board.motion.position[0]) == (1, 0.0, 0.0)
 
 
-# Urgent orders
+# Urgent commands
 
 
 @pytest.mark.parametrize("order", ["M112", "N9 M112*36", "N9 M112*0", "  M112"])

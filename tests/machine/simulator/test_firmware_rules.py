@@ -1,4 +1,4 @@
-"""RepRapFirmware's and Klipper's own rules at their end of the line, and each family's refusals, row by row."""
+"""The rules of RepRapFirmware and Klipper, and the refusals of each firmware family."""
 
 from math import inf
 
@@ -105,7 +105,7 @@ def test_the_terminal_s_back_pressure_reaches_the_host() -> None:
 
 
 def test_klipper_sees_m112_out_of_order_and_tells_the_reason_to_what_waits_behind_it() -> None:
-    """klippy/gcode.py: _process_data looks for M112 before it is at work; _respond_state, then _respond_error of the next one."""
+    """klippy/gcode.py: _process_data searches for M112 before it processes; _respond_state, then _respond_error for the next."""
     firmware = SimulatedFirmware(KLIPPER)
     answer(firmware, "G4 S50\nG1 X5\n", until_s=1.0)
     said = answer(firmware, "M112\n", until_s=1.0)
@@ -176,7 +176,7 @@ def test_marlin_lets_x_y_and_z_go_after_two_idle_minutes_and_does_not_know_where
     answer(firmware, "G28\nG1 X5 Y5 Z50 F6000\nM400\n")
     answer(firmware, "", firmware.board.now_s + 119.0)
     assert not happened(firmware.record(), "motors off")
-    answer(firmware, "M105\n", firmware.board.now_s + 2.0)  # no move: it does not count
+    answer(firmware, "M105\n", firmware.board.now_s + 2.0)  # not a move, so it does not count
     answer(firmware, "G1 X6 Y6 Z51\n")
     assert happened(firmware.record(), "motors off")
     assert answer(firmware, "M114\n")[0].startswith("X:6.00 Y:6.00 Z:51.00")
@@ -191,7 +191,7 @@ def test_m84_with_an_idle_time_of_0_keeps_marlin_s_motors_on() -> None:
 
 
 def test_klipper_shuts_down_after_ten_idle_minutes_and_moves_nothing_any_more() -> None:
-    """klippy/extras/idle_timeout.py: TURN_OFF_HEATERS, M84; a dwell begins the time anew, M105 and M400 do not."""
+    """klippy/extras/idle_timeout.py: TURN_OFF_HEATERS, M84; a dwell restarts the timeout, M105 and M400 do not."""
     firmware = SimulatedFirmware(KLIPPER)
     answer(firmware, "G28\nM104 S200\nG1 X5\nM400\n")
     answer(firmware, "", firmware.board.now_s + 599.0)

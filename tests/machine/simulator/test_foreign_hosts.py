@@ -1,4 +1,4 @@
-"""Hosts that know nothing of this program print whole files on the simulated printer: Printrun's core, and others' idioms."""
+"""Independent hosts print whole files on the simulated printer: Printrun's core, and idioms of others."""
 
 import time
 from collections.abc import Callable
@@ -31,7 +31,7 @@ def lines() -> tuple[str, ...]:
 
 
 def assert_printed(record: Record) -> None:
-    """All strokes of the file, as the reader reads them, and nothing that the printer did not understand."""
+    """Check that every stroke of the file, as parsed, was printed and that the printer understood every line."""
     parsed = parse_gcode(lines(), CHOSEN.machine)
     strokes = parsed.kind == MoveKind.EXTRUDE
     laid = (record.end[:, 5] > record.start[:, 5]) & (record.start[:, :5] != record.end[:, :5]).any(axis=1)
@@ -41,7 +41,7 @@ def assert_printed(record: Record) -> None:
 
 
 def soon(what: Callable[[], object], seconds: float = PATIENCE_S) -> None:
-    """Wait until something is so."""
+    """Wait until a condition holds."""
     end_s = time.monotonic() + seconds
     while not what():
         assert time.monotonic() < end_s, "nothing comes of it"
@@ -49,7 +49,7 @@ def soon(what: Callable[[], object], seconds: float = PATIENCE_S) -> None:
 
 
 def print_with_printcore(printer: SimulatedPrinter, heard: list[str] | None = None) -> Record:
-    """As Printrun's own command line tool does it; heard: gets what the printer said."""
+    """Print as Printrun's own command line tool does; heard: receives the printer's lines."""
     core_of = pytest.importorskip("printrun.printcore", reason="pip install --no-deps printrun")
     core = core_of.printcore()
     core.recvcb = (heard if heard is not None else []).append
@@ -57,7 +57,7 @@ def print_with_printcore(printer: SimulatedPrinter, heard: list[str] | None = No
     try:
         soon(lambda: core.online)
         assert core.startprint(core_of.gcoder.LightGCode(list(lines())))
-        # It says that it has printed before the thread that it goes on with has begun.
+        # It reports the end of the print before the thread with which it continues has begun.
         soon(lambda: not (core.printing or core.print_thread) and core.send_thread and core.send_thread.is_alive())
         soon(lambda: printer.record.events[-1][1] == "motors off")
     finally:
@@ -92,7 +92,7 @@ def framed(number: int, command: str) -> bytes:
 
 
 def ask(host: serial.Serial, line: bytes) -> list[bytes]:
-    """Send a line, read to its ok: what the simplest of hosts does."""
+    """Send a line and read up to its ok, as the simplest hosts do."""
     host.write(line)
     said = []
     while not said or not said[-1].startswith(b"ok"):

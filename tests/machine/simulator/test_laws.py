@@ -1,4 +1,4 @@
-"""Laws of a simulated printer under any commands, at any times, of any family, on any line."""
+"""Invariants of a simulated printer under any commands, at any times, of any family, on any line."""
 
 import random
 from math import inf

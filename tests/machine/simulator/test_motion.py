@@ -7,7 +7,7 @@ from profiles.profile import load
 
 
 def _seconds(words: dict[str, float], limits: dict[str, float]) -> float:
-    """How long one move takes that stands alone, with a corner speed of nothing."""
+    """Duration of a single move with a corner speed of 0."""
     motion = Motion(load().machine.model_copy(update={"junction_speed_mm_s": 0.0}), home_start=False)
     motion.accelerate(limits)
     motion.reach(motion.target(words), 0.0)

@@ -1,4 +1,4 @@
-"""The simulated planner: the dry run's times where it is fed well, stops and slow moves where it starves."""
+"""The simulated planner: the dry run's times with a steady supply of lines, stops and slow moves without."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ def ran(lines: list[str], until_s: float = float("inf")) -> SimulatedFirmware:
 
 
 def wave(seed: int, n: int) -> list[str]:
-    """Moves of 2 to 30 mm that turn corners of all kinds, some in Z, some of the table."""
+    """Moves of 2 to 30 mm with corners of all kinds, some in Z, some of the table."""
     rng = np.random.default_rng(seed)
     at, lines = np.zeros(5), []
     for _ in range(n):
@@ -54,7 +54,7 @@ def test_moves_follow_each_other_without_a_gap() -> None:
 
 
 def test_every_speed_change_is_within_the_acceleration() -> None:
-    """The straight way of many short moves takes as long as one long move."""
+    """A straight line takes as long in many short moves as in one long move."""
     whole = ran(["G1 X100 F6000", "M400"]).record().duration_s.sum()
     pieces = ran([*(f"G1 X{k} F6000" for k in range(5, 101, 5)), "M400"]).record().duration_s.sum()
     assert pieces == pytest.approx(whole, rel=1e-6)
@@ -92,7 +92,7 @@ def test_waits_of_the_program_are_no_underruns() -> None:
 
 @pytest.mark.parametrize(("baud", "starves"), [(115200, True), (1000000, False)])
 def test_whether_a_line_starves_the_printer_depends_on_its_rate(baud: int, starves: bool) -> None:
-    """0.15 mm at 60 mm/s want 400 lines a second; 115200 baud carry 270 of these, 1 MBd 2,300."""
+    """0.15 mm at 60 mm/s needs 400 lines a second; 115200 baud carries 270 of these, 1 MBd 2,300."""
     firmware = SimulatedFirmware(MACHINE, BuildOptions(advanced_ok=False, busy=False, home_start=False))
     line = Uart(Cable(firmware, speed=1.0), baud)
     lines = b"".join(frame(1000 + k, f"G1 X{k * 0.15:.3f} Y0.000 E0.01 F3600") for k in range(1, 801))

@@ -1,4 +1,4 @@
-"""Probing in the name of each firmware: where it stops, and what is said of it."""
+"""Probing commands of each firmware: the stop position and the answer."""
 
 import pytest
 

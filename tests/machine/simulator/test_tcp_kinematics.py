@@ -1,4 +1,4 @@
-"""A firmware that follows the table (G43.4): measured positions of the real one, and the record in the workpiece frame."""
+"""A firmware that compensates for the table's rotation (G43.4): positions measured on the real one, and the workpiece frame."""
 
 from math import inf
 
@@ -26,7 +26,7 @@ CENTRED = {"point_mm": (100.0, 100.0, 0.0), "limits_deg": (-36000.0, 36000.0), "
 
 
 def paths(record: Record) -> Floats:
-    """(n, 2, 3) every move in the workpiece frame, mm; a move that turns the table is a curve there, these are its ends."""
+    """Every move in the workpiece frame, mm, (n, 2, 3); a move that turns the table is a curve there, and these are its ends."""
     return np.stack([workpiece_path(record.machine, points[:, :5]) for points in (record.start, record.end)], axis=1)
 
 

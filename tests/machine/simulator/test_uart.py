@@ -1,4 +1,4 @@
-"""A UART takes its time, overflows, and tears what overflows; time is virtual unless a terminal is used."""
+"""A UART: its speed, overflow, and lines damaged by overflow; time is virtual unless a terminal is used."""
 
 import time
 from itertools import pairwise
@@ -28,7 +28,7 @@ def uart(
 
 
 def ping_pong_lines_per_s(baud: int, size: int, lines: int = 200) -> float:
-    """Lines a second of a sender that waits for each `ok` of 16 bytes (ADVANCED_OK's)."""
+    """Lines a second of a sender that waits for each `ok` of 16 bytes (with ADVANCED_OK)."""
     _, line = uart(baud, BuildOptions(rx_ring=128))
     now_s = 0.0
     for number in range(1000, 1000 + lines):

@@ -1,4 +1,4 @@
-"""Models on a bench, their meshes in files as long as the tests run."""
+"""Models on a bench, with their meshes in files that exist while the tests run."""
 
 import tempfile
 from itertools import count
@@ -24,17 +24,17 @@ def model(name: str = "tee.stl", mesh: Mesh | None = None) -> Model:
 
 
 def changed(history: History, name: str, **asked: Any) -> History:
-    """The history after what a page asks to be changed."""
+    """The history after a page's command."""
     return history.do(CHANGES[name][1], changed_bench(history.now.bench, name, **asked))
 
 
 def changed_bench(bench: Bench, name: str, **asked: Any) -> Bench:
-    """The bench after what a page asks to be changed."""
+    """The bench after a page's command."""
     _, arguments = read_command({"do": name, **asked}, COMMANDS)
     return CHANGES[name][0](bench, **dict(arguments))
 
 
 def edited_cuts(bench: Bench, name: str, **asked: Any) -> Cuts:
-    """The cuts after an edit that a page asks for."""
+    """The cuts after a page's edit."""
     _, arguments = read_command({"do": name, **asked}, COMMANDS)
     return EDITS[name](bench, **dict(arguments)).cuts

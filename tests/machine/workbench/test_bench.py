@@ -1,4 +1,4 @@
-"""The bench as a value: turning, laying down, taking a row, undo and redo."""
+"""The bench as a value: rotating, placing on a face, choosing a row, undo and redo."""
 
 from dataclasses import replace
 from typing import Any

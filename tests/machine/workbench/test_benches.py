@@ -1,4 +1,4 @@
-"""Several models in one run of the workbench: a bench each, that is closed with its work and leaves the others alone."""
+"""Several models in one run of the workbench: each has a bench, which is closed with its work and leaves the others alone."""
 
 import json
 import time
@@ -14,7 +14,7 @@ from tests.shapes import tee
 
 
 def above(bench: Running, path: str) -> str:
-    """A path below the token, of no bench."""
+    """A path below the token that belongs to no bench."""
     return f"/{bench.place.split('/')[1]}/{path}"
 
 
@@ -36,7 +36,7 @@ def test_a_second_model_lies_on_a_bench_of_its_own_that_is_closed_with_its_proce
     before = set(bench.children())
     number = json.loads(change(bench, "benches?like=1", "POST")[1])["number"]
     second = Running(bench.process, bench.address.replace("/1/", f"/{number}/"))
-    with bench.line() as page:  # which hears of the other bench over its own line
+    with bench.line() as page:  # it receives news of the other bench over its own line
         page.until(lambda state: [entry["name"] for entry in state["benches"]] == ["first.stl", ""])
         second.send(_file(tmp_path, "second.stl"))
         page.until(lambda state: [entry["name"] for entry in state["benches"]] == ["first.stl", "second.stl"])

@@ -1,4 +1,4 @@
-"""The table of commands: what each needs on the bench, and that the page's scripts know the very same names."""
+"""The table of commands: the state of the bench that each needs, and the same names in the page's scripts."""
 
 import re
 from collections.abc import Iterator
@@ -45,7 +45,7 @@ PAGE = resources.files("machine.workbench.web").joinpath("page")
 
 
 def bare(bench: Bench) -> Any:
-    """A session on whose bench nothing is sliced, and which can do nothing."""
+    """A session on whose bench nothing is sliced, and without any functions."""
     return SimpleNamespace(bench=bench, note="", forget_problem=lambda: None, slicing=SimpleNamespace(lacking=lambda: UNSLICED))
 
 
@@ -74,7 +74,7 @@ def test_the_page_knows_the_very_same_names() -> None:
         for pattern in (r'\bdo: "(\w+)"', r'command\("(\w+)"', r'data-(?:do|print)="(\w+)"')
         for word in re.findall(pattern, page)
     }
-    never_said_so = {"resume", "feed", "flow"}  # by variables
+    never_said_so = {"resume", "feed", "flow"}  # sent through variables
     assert {*COMMANDS, *OF_PRINTS, *OF_DEVICES} - said <= never_said_so
     assert said <= {*COMMANDS, *OF_PRINTS, *OF_DEVICES}
 
@@ -99,7 +99,7 @@ def test_the_page_sends_with_a_command_what_it_has_and_all_that_it_needs() -> No
     assert [(fields, keys) for fields, keys in sent if not keys <= {*fields}] == []
     needed = [({name for name, field in fields.items() if field.is_required()}, keys) for fields, keys in sent]
     spread = [(missing, keys) for required, keys in needed if (missing := required - keys)]
-    assert len(spread) <= 6  # that get theirs by `...plane`, or the number of their print
+    assert len(spread) <= 6  # they receive theirs through `...plane`, or as the number of their print
 
 
 def test_the_documentation_lists_every_command_and_no_other() -> None:

@@ -1,4 +1,4 @@
-"""Values that follow from a bench: worked out for the newest key, answers that come too late dropped, changes one at a time."""
+"""Values derived from a bench: computed for the newest key, late results dropped, changes one at a time."""
 
 import asyncio
 from collections.abc import Callable, Coroutine
@@ -21,7 +21,7 @@ PROFILE = load()
 
 
 class Copies:
-    """A session whose bench is changed by its number of copies, on which the derived value depends; its task waits for a word."""
+    """A session whose bench is changed by its number of copies, from which the value is derived; its task waits for `go_on`."""
 
     def __init__(self, **how: Any) -> None:
         self.session = SessionBase(Bench(PROFILE), WorkerPools())
@@ -44,7 +44,7 @@ class Copies:
         return 10 * bench.copies
 
     async def become(self, *copies: int) -> None:
-        """Change the bench, once or several times without a pause, and let the loop go on."""
+        """Change the bench, once or several times without a pause, and let the loop run."""
         for count in copies:
             self.session.do("copies", replace(self.session.bench, copies=count))
         for _ in range(5):

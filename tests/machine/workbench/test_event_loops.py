@@ -1,4 +1,4 @@
-"""The event loop of the benches and that of the prints: what hangs in the one holds up nothing in the other."""
+"""The event loops of the benches and of the prints: a blocked one does not delay the other."""
 
 import asyncio
 from collections.abc import Iterator
@@ -74,7 +74,7 @@ def test_an_emergency_stop_is_given_while_the_sessions_hang(benches: Loop, monke
 
 
 class TakenAway(Slicing):
-    """Slices that something else takes away in the bench's loop between two reads of them, if it gets a turn there."""
+    """Slices that the bench's loop removes between two reads of them, if it gets a turn there."""
 
     def __init__(self, loop: asyncio.AbstractEventLoop, slices: Any) -> None:
         self.done = slices
@@ -108,7 +108,7 @@ def test_an_order_is_of_one_moment_of_its_bench(benches: Loop, monkeypatch: pyte
 
 
 def scope(path: str) -> dict[str, Any]:
-    """A websocket that a page of this server asks for."""
+    """A websocket requested by a page of this server."""
     host = f"127.0.0.1:{PORT}"
     headers = [(b"host", host.encode()), (b"origin", f"http://{host}".encode())]
     return {"type": "websocket", "path": path, "headers": headers, "query_string": b"page=mine"}

@@ -1,4 +1,4 @@
-"""Work that is kept by itself, and files of pages: written to folders, opened again, refused with a sentence or removed."""
+"""Autosaved work and files sent by pages: written to folders, opened again, refused with a sentence or removed."""
 
 import asyncio
 import errno
@@ -153,7 +153,7 @@ def test_a_full_disk_is_told_once_and_what_was_kept_before_is_still_there(bench:
 
 
 class Slow:
-    """Writes of work that wait, each for a word; what was written, in order, and the most of them that went on at a time."""
+    """Writes of work that wait for `go_on`; the benches written, in order, and the greatest number of simultaneous writes."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.go_on, self.begun = Event(), Event()
@@ -187,7 +187,7 @@ def test_a_bench_that_closes_waits_for_the_write_under_way_writes_what_is_newer_
         assert await asyncio.to_thread(slow.begun.wait, 20.0)
         session.do("copies", replace(on_bench, copies=2))
         closing = asyncio.create_task(session.close())
-        await asyncio.sleep(0.05)  # in which it would end, if it did not wait
+        await asyncio.sleep(0.05)  # it would end in this time if it did not wait
         assert not closing.done()
         assert sent.is_file()
         slow.go_on.set()
@@ -234,7 +234,7 @@ def test_kept_work_is_opened_on_one_bench_at_a_time(bench: Bench) -> None:
             with pytest.raises(PlanError, match="is not kept any more, or another page has opened it"):
                 async with second.keeping.opening(folder):
                     raise AssertionError("it is open already")
-        assert folders_kept() == []  # it is the first one's now
+        assert folders_kept() == []  # it belongs to the first session now
         await first.close()
         await second.close()
 
@@ -297,7 +297,7 @@ def test_kept_work_is_listed_where_the_system_has_no_locks_and_no_files_of_other
     monkeypatch.setattr(files, "fcntl", None)
     folder = new_folder()
     write_work(folder, bench)
-    received = Received()  # of a program that runs
+    received = Received()  # of a running program
     received.new_file("tee.stl").touch()
     assert folders_kept() == [folder]
     assert tidy_left() == ()
@@ -315,19 +315,19 @@ async def _settled(kept: Keeping) -> None:
 
 @pytest.fixture
 def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder for temporary files, of this process and of those that it starts."""
+    """The folder for temporary files of this process and its children."""
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path
 
 
 def names_in(folder: Path) -> list[str]:
-    """Its files, without those that a bench has made of what it has received."""
+    """Names of the files in a folder, without those that a bench has derived from received files."""
     return sorted(path.name for path in folder.rglob("*") if path.is_file() and not path.name.startswith("made-"))
 
 
 def left_by_a_killed_one(*names: str) -> Path:
-    """The folder of a program that had received such files when it was killed."""
+    """The folder of a program that had received these files when it was killed."""
     with subprocess.Popen([sys.executable, "-c", HOLDS, *names], stdout=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
         folder = Path(process.stdout.readline().strip())
@@ -344,12 +344,12 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
     (sent / "tee.stl").write_bytes(stl(tee()))
     (sent / "plan.toml").write_text("nothing = [")
     with workbench("--upload-mib", "1") as bench, bench.line() as page:
-        with suppress(OSError):  # it is not heard to its end
+        with suppress(OSError):  # the server does not read it to its end
             bench.send(sent / "large.stl")
         problem = page.until(lambda state: state["problem"])["problem"]
         assert problem.startswith("large.stl: has more than the 1 MiB that a page may send:")
         assert [bench.send(sent / name)[0] for name in (broken, "tee.stl", "plan.toml")] == [422, 200, 422]
-        assert json.loads(bench.send(sent / broken)[1])["problem"].startswith(f"{broken} is ")  # in no words of the page's
+        assert json.loads(bench.send(sent / broken)[1])["problem"].startswith(f"{broken} is ")  # not in words of the page
         assert [names_in(folder) for folder in temporary.glob("tiltprint-edit-*") if names_in(folder)] == [["tee.stl"]]
     assert list(temporary.glob("tiltprint-edit-*")) == []
 
@@ -369,7 +369,7 @@ def test_a_folder_without_a_file_is_removed_when_it_is_not_new_and_that_of_one_t
     received.new_file("tee.stl").write_text("solid")
     empty = left_by_a_killed_one()
     assert tidy_left() == ()
-    assert empty.exists()  # it may be of a program that starts now
+    assert empty.exists()  # it may belong to a program that is starting
     past_s = empty.stat().st_mtime - BEGUN_S
     os.utime(empty, (past_s, past_s))
     assert tidy_left() == ()

@@ -1,4 +1,4 @@
-"""The websocket of a page: what is no command, what is no fault, and that nothing of it is left."""
+"""The websocket of a page: invalid commands, harmless disconnections, and cleanup."""
 
 import asyncio
 import json
@@ -39,7 +39,7 @@ BEAT = -1  # an empty message
 
 
 class Page:
-    """The socket of a page that takes what it is told as long as it is awake."""
+    """The socket of a page that accepts messages as long as it is awake."""
 
     def __init__(self) -> None:
         self.heard: list[int] = []
@@ -100,7 +100,7 @@ def test_fifty_pages_that_read_nothing_hold_up_nobody_and_hear_the_newest_when_t
 
 
 class Directions:
-    """The two coroutines of a line, and which of them goes on."""
+    """The two coroutines of a line, and the number that are running."""
 
     def __init__(self) -> None:
         self.going = 0

@@ -1,4 +1,4 @@
-"""A model: its mesh in a file is what was read, goes through no pipe and lasts as long as the model is used; how it stands."""
+"""A model: its mesh file holds what was read, is not sent through a pipe, and exists while the model is used; its pose."""
 
 import asyncio
 import gc
@@ -59,7 +59,7 @@ def test_what_goes_through_a_pipe_of_a_model_is_as_short_for_many_faces_as_for_f
 
 
 def read(work: Any, path: Path) -> Any:
-    """What work gives with a session in which a model has been opened, whose tasks are done in this process."""
+    """The result of `work` with a session in which a model has been opened, whose tasks run in this process."""
 
     async def run() -> Any:
         session = Session(load(), Given(), WorkerPools())
@@ -116,7 +116,7 @@ def test_the_mesh_of_a_model_that_nobody_can_come_back_to_takes_no_room_any_more
         await until_idle(session)
         session.do("something else", replace(session.bench, copies=2))
         await until_idle(session)
-        await asyncio.sleep(1.2 * AFTER_S)  # in which the autosave has nothing to write any more
+        await asyncio.sleep(1.2 * AFTER_S)  # in this time the autosave has nothing left to write
         gc.collect()
         return undone, file.is_file()
 
@@ -137,7 +137,7 @@ def test_the_parts_folder_has_the_meshes_that_its_plan_names(tmp_path: Path) -> 
 
 
 def project(path: Path, mesh: Mesh, given: Given, plan: PlanFile | None = None) -> Path:
-    """A project file of a model beside it."""
+    """A project file with its model beside it."""
     (path.parent / "own.stl").write_bytes(stl(mesh))
     made = Project("own.stl", path.parent / "own.stl", given, parts=1)
     path.write_bytes(project_bytes(made, plan or PlanFile("own.stl"), mesh, b""))
@@ -195,12 +195,12 @@ def standing(mesh: Mesh, turns_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def plated(bench: Bench) -> Plated:
-    """The plate of a bench, with its files in a folder that is gone then."""
+    """The plate of a bench; the folder of its files is removed afterwards."""
     with TemporaryDirectory() as folder:
         return put_on_plate(lambda report: None, bench, Path(folder) / "others", Path(folder) / "drawn")
 
 
-# A tee is 10 mm thick: its bar of 40 mm hangs over its stem by 15 mm at each side, and seen along its thickness it has 700 mm2.
+# A tee is 10 mm thick: its bar of 40 mm extends beyond its stem by 15 mm at each side; along its thickness its area is 700 mm2.
 @pytest.mark.parametrize(("turns_deg", "overhang_mm2", "size_mm"), [
     ((0.0, 0.0, 0.0), 300.0, (40.0, 10.0, 40.0)),
     ((180.0, 0.0, 0.0), 0.0, (40.0, 10.0, 40.0)),
@@ -240,7 +240,7 @@ def test_on_a_pedestal_the_feet_stand_and_its_triangles_are_those_of_a_body_of_i
     points, faces = np.frombuffer(stood.pedestal, "<u4", 2)
     places = np.frombuffer(stood.pedestal, "<f8", 3 * points, 8).reshape(-1, 3)
     assert len(stood.pedestal) == 8 + 24 * points + 12 * faces
-    assert np.ptp(places, axis=0) == pytest.approx((14.0, 14.0, 10.3), abs=0.01)  # its feet and 2 mm, and what is sunk in
+    assert np.ptp(places, axis=0) == pytest.approx((14.0, 14.0, 10.3), abs=0.01)  # feet + 2 mm; height with its sunk part
     assert (stood.overhang_mm2, stood.size_mm[2]) == (pytest.approx(300.0), pytest.approx(40.0))
 
 

@@ -1,4 +1,4 @@
-"""What the page says to its server: every command of a script or a button is one of the server's, with fields that it has."""
+"""Messages of the page to its server: every command of a script or a button exists on the server, with the fields sent."""
 
 import re
 
@@ -11,21 +11,21 @@ from machine.workbench.web.line import DEVICE_COMMANDS
 from machine.workbench.web.server import OWN
 
 SAID = re.compile(r'\{ do: "(\w+)"')
-ADDED = {"page", "ask", "near"}  # by send(), by ask(), and where the nearest place is asked for
+ADDED = {"page", "ask", "near"}  # added by send(), by ask(), and for the nearest place
 SCRIPTS = {file: file.read_text("utf-8") for file in sorted(OWN.rglob("*.js"))}
 PAGE = (OWN / "page.html").read_text("utf-8")
-TO_PRINTS = {"print-panel", "print-shown"}  # scripts whose commands go by the line to the prints
+TO_PRINTS = {"print-panel", "print-shown"}  # scripts that send their commands over the line to the prints
 BENCH, PRINTS = set(of_bench.COMMANDS), set(of_prints.COMMANDS)
 
 
 def said(where: set[str] | None = None) -> list[tuple[str, set[str]]]:
-    """Name and fields of every command in the scripts that go to the prints, or in the others."""
+    """Name and fields of every command in the scripts that send to the prints, or in the others."""
     texts = [text for file, text in SCRIPTS.items() if (file.stem in TO_PRINTS) == (where is PRINTS)]
     return [(match[1], fields_of(text[match.end() :])) for text in texts for match in SAID.finditer(text)]
 
 
 def fields_of(rest: str) -> set[str]:
-    """The keys of an object literal from behind its first one on; what it takes from others by `...` is not known."""
+    """The keys of an object literal, from behind its first one; keys inserted by `...` are not known."""
     depth, pieces = 0, [""]
     for letter in rest:
         depth += (letter in "([{") - (letter in ")]}")

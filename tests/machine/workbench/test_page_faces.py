@@ -18,7 +18,7 @@ pytestmark = needs_node
 
 
 def run(script: Path, act: str, **given: Any) -> Any:
-    """What a function's body gives, the modules of a script and given values known by their names."""
+    """The value of a function body that can use the modules of a script and the given values by their names."""
     values = "".join(f"const {name} = {json.dumps(value)};" for name, value in given.items())
     page = "globalThis.document = { documentElement: { dataset: {} }, getElementById: () => null };"
     text = f"{page}{bundle(script)}\n{values} process.stdout.write(JSON.stringify((() => {{ {act} }})()));"
@@ -33,7 +33,7 @@ def triangles(mesh: Mesh) -> dict[str, Any]:
 
 
 def nearest(mesh: Mesh, start: np.ndarray, along: np.ndarray) -> int:
-    """The first face on a ray, by the three coordinates of the point at which it meets the plane of each face."""
+    """The first face on a ray, from the barycentric coordinates of the point at which it meets the plane of each face."""
     a, b, c = np.moveaxis(mesh.vertices[mesh.faces], 1, 0)
     columns = np.stack([b - a, c - a, np.broadcast_to(-along, a.shape)], axis=2)
     u, v, far = np.linalg.solve(columns, (start - a)[:, :, None])[:, :, 0].T
@@ -89,7 +89,7 @@ def test_the_plate_has_millimetres_on_it_and_the_front_before_it() -> None:
     ends = [np.reshape(places, (-1, 2, 3)) for places in lines]
     for strokes, low_mm in zip(ends, (-100.0, -50.0), strict=True):
         front = strokes[(strokes[:, :, 1] < low_mm - 1).all(axis=1)]
-        assert abs(front[:, :, 0].mean()) < 1.5  # FRONT stands before the middle
+        assert abs(front[:, :, 0].mean()) < 1.5  # FRONT is in front of the middle
     ticks = {round(float(-a[1]), 2) for a, b in ends[0] if a[0] == 0.0 and a[1] == b[1] <= 0.0 < b[0] < 1.0}
     assert ticks == {4.0 * k for k in range(26)}
 

@@ -1,10 +1,10 @@
-"""Temperatures on a page: fresh ones stand alone, old ones are marked with their age, which goes on when nothing more comes."""
+"""Temperatures on a page: fresh ones have no mark, old ones show their age, which keeps increasing without news."""
 
 import pytest
 
 from tests.machine.fake_page import needs_node, on_fake_page
 
-# A print that is heard of once, at the beginning of time.
+# A print that is reported once, at time 0.
 HEARD = """
     printPanel();
     const heats = { nozzle_c: 209.6, nozzle_target_c: 210, bed_c: 60, bed_target_c: null, heat_s: 0, heat_is_old: false };

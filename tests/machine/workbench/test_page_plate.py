@@ -1,4 +1,4 @@
-"""The list of the models on the plate: a row for each, also when a file is there twice."""
+"""The list of the models on the plate: a row for each, even if a file is there twice."""
 
 from machine.workbench.web.server import OWN
 from tests.machine.fake_page import needs_node, on_fake_page

@@ -1,4 +1,4 @@
-"""What a page tells of its prints beside their figures: the tab's title, the browser's notice, the graph of temperatures."""
+"""News of a page about its prints: the tab's title, the browser's notification, the graph of temperatures."""
 
 from tests.machine.fake_page import needs_node, on_fake_page
 
@@ -32,7 +32,7 @@ def test_the_browser_says_once_that_a_print_of_this_page_is_over() -> None:
     over = "tell('done', 1, { is_over: true, sentence: 'the print is done' });"
     assert on_fake_page(f"{PAGE} tell('printing', 0.5); {over} {over} return said;") == ["box: the print is done"]
     assert on_fake_page(f"{PAGE} known.holder = 'another page'; tell('printing', 0.5); {over} return said;") == []
-    assert on_fake_page(f"{PAGE} {over} return said;") == []  # it was over before this page was there
+    assert on_fake_page(f"{PAGE} {over} return said;") == []  # it was over before this page was opened
 
 
 @needs_node

@@ -1,10 +1,10 @@
-"""The emergency stop of a page: which print it is given to, by which keys, and what becomes of one that finds no line."""
+"""The emergency stop of a page: the print that it stops, its keys, and a stop without a connection."""
 
 import pytest
 
 from tests.machine.fake_page import needs_node, on_fake_page
 
-# Two prints run, the second one is the newest; the page is of none of them.
+# Two prints run, the second one is the newest; the page controls neither.
 TWO_PRINTS = """
     printPanel();
     const known = { port: "sim", state: "printing", at: {}, checks: [], words: [], said: [] };

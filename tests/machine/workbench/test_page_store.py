@@ -1,4 +1,4 @@
-"""The store of the page: changes are told in their order, each with what was before, and there is no other way of change."""
+"""The store of the page: changes are reported in order, each with the previous values, and only the store writes into itself."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Page words: what a terminal names by options and keys, a page names by its own fields and labels."""
+"""Page words: a page names options and keys by its own fields and labels."""
 
 import ast
 import re
@@ -110,7 +110,7 @@ def test_a_page_gets_the_names_of_its_bench_as_they_are() -> None:
 
 
 ROOT = Path(machine.pipeline.requests.__file__).parents[2]
-# Files whose options are no part of a message, or of one that only a terminal shows.
+# Files whose options do not appear in messages, or only in messages on a terminal.
 UNMARKED = {
     "machine/cli": "messages of commands, which no page shows",
     "machine/notices.py": "what the terminal's front end adds to a forced error",

@@ -1,4 +1,4 @@
-"""The parts drawn apart: the block that the page reads."""
+"""The block with the separated parts that the page reads."""
 
 from machine.workbench.work.cutting import pieces_block
 from mdp.search.search import SearchRequest, decompose

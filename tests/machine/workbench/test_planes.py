@@ -1,4 +1,4 @@
-"""Planes and marks as values: edits, locks, and what stays on the model when it is turned or scaled."""
+"""Planes and marks as values: edits, locks, and marks that stay on the model when it is rotated or scaled."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Several models on the plate of the workbench: how they get there, that they are printed as by the command line, and kept."""
+"""Several models on the plate of the workbench: added, printed as by the command line, and kept."""
 
 import json
 from pathlib import Path
@@ -27,7 +27,7 @@ def folder(folder: Path) -> Path:
 
 
 def two(copies: int = 1) -> Bench:
-    """A tee, or several, with two boxes beside it."""
+    """One or more copies of a tee, with two boxes beside it."""
     return with_beside(Bench(load(), model(), copies=copies), ((model("box.stl"), 2),))
 
 
@@ -64,7 +64,7 @@ def test_the_command_line_names_every_model_with_its_copies_and_the_plan_of_the_
 
 
 def add(bench: Running, file: Path) -> tuple[int, bytes]:
-    """A file as a page of this server sends it to be put on the plate."""
+    """Add a file to the plate as a page of this server does."""
     return bench.ask(f"file?name={file.name}&add=yes", "POST", file.read_bytes(), Origin=f"http://127.0.0.1:{bench.port}")
 
 
@@ -74,7 +74,7 @@ def sliced(page: Page) -> dict[str, Any]:
 
 
 def drawn(bench: Running, state: dict[str, Any]) -> tuple[int, float]:
-    """Number of faces and height of what is drawn of the other models, mm."""
+    """Number of faces, and height in mm, of the drawn bodies of the other models."""
     content = bench.ask(f"others/{state['others']}")[1]
     points, faces = np.frombuffer(content, "<u4", 2)
     vertices = np.frombuffer(content, "<f8", 3 * points, 8).reshape(-1, 3)
@@ -94,7 +94,7 @@ def test_the_g_code_of_a_plate_is_that_of_the_command_line_and_the_plate_is_kept
         assert drawn(bench, state) == (2 * len(tee().faces), 40.0)
         sliced(page)
         laid = page.until(lambda now: now["others"] not in (None, state["others"]))
-        assert drawn(bench, laid) == (2 * len(tee().faces), 10.0)  # on its front, where nothing hangs over
+        assert drawn(bench, laid) == (2 * len(tee().faces), 10.0)  # on its front, without overhangs
         command = json.loads(bench.ask("settings.json?part=0")[1])["command"]
         assert command.startswith("tiltprint export box.stl tee.stl:2 --")
         assert command.endswith(" --plan box-plan.toml -o box.gcode")
@@ -145,7 +145,7 @@ def test_a_model_opened_over_another_one_can_be_put_beside_it_instead(bench: Run
         assert (page.state["unsliceable"], page.state["is_sure"]) == (
             "",
             False,
-        )  # the boxes are laid down first, which may make room
+        )  # slicing chooses an orientation of the boxes first, which may make room
         assert (page.state["misplaced"], len(page.state["copies_mm"])) == (True, 1)
         assert drawn(bench, page.state)[0] == 900 * 12
         page.do("slice")

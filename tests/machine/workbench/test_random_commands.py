@@ -1,4 +1,4 @@
-"""Commands at random: whatever is asked for in whatever order, the plan is read again as it is, and undo leads back."""
+"""Random commands in random order: the saved plan is read back unchanged, and undo leads back."""
 
 import asyncio
 from collections.abc import Callable
@@ -51,7 +51,7 @@ FRONT = [
 
 
 class Anything:
-    """What somebody may ask for who does not look; some of it makes no sense."""
+    """Random commands of a careless user; some make no sense."""
 
     def __init__(self, seed: int) -> None:
         self.any = Random(seed)
@@ -124,7 +124,7 @@ class Anything:
 
 
 class Tried:
-    """A session whose processes find what is asked for at once, and what is saved of it."""
+    """A session whose processes answer at once, with its saved plan."""
 
     def __init__(self, seed: int, folder: Path) -> None:
         self.asked, self.folder, self.plan = Anything(seed), folder, folder / "plan.toml"
@@ -193,7 +193,7 @@ def test_after_any_commands_the_plan_is_read_again_as_it_is_and_undo_and_redo_le
         await session.open_model(tmp_path / "tee.stl", "tee.stl")
         for _ in range(COMMANDS):
             await tried.take(tried.asked.command())
-            if session.bench.model is None:  # all is undone
+            if session.bench.model is None:  # everything is undone
                 await tried.take({"do": "redo"})
         bench, given = session.bench, session.bench.given
         await tried.take({"do": "save"})

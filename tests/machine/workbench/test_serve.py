@@ -1,4 +1,4 @@
-"""The port of a workbench: whose it is, and that of one that was killed, with the files that lay on its benches."""
+"""The port of a workbench: its owner, and reuse after a workbench was killed, with the files that were on its benches."""
 
 import json
 import signal
@@ -18,7 +18,7 @@ from tests.machine.running_workbench import PATIENCE_S, Running, workbench
 from tests.shapes import tee
 
 TEE = stl(tee())
-# Controls that ask the bench for something.
+# Controls that send a request to the bench.
 ASKING = """[...document.querySelectorAll(`:is([data-do], [data-demo], [data-save], [data-turn], #find, #slice, #again,
   #open, #save, #history, #file, #demo, #save-errors)`)]"""
 ENABLED = f"{ASKING}.filter((control) => !control.matches(':disabled')).map((control) => control.outerHTML)"
@@ -26,7 +26,7 @@ ENABLED = f"{ASKING}.filter((control) => !control.matches(':disabled')).map((con
 
 @pytest.fixture
 def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The folder for temporary files, of this process and of those that it starts."""
+    """The folder for temporary files of this process and its children."""
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     return tmp_path
@@ -34,7 +34,7 @@ def temporary(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.fixture
 def port() -> str:
-    """One that is free."""
+    """A free port."""
     with socket.create_server(("127.0.0.1", 0)) as own:
         return str(own.getsockname()[1])
 
@@ -50,7 +50,7 @@ def send(running: Running, folder: Path, name: str, content: bytes) -> int:
 
 
 def wait_until_kept(since_s: float) -> None:
-    """Until all that was done on the one bench from a time on is in the state folder."""
+    """Wait until a locked plane is saved in the state folder after this time."""
     end_s = time.monotonic() + 30.0
     folder = kept_folder()
     while not any(_is_locked(record, since_s) for record in folder.glob("*/work.json")):
@@ -67,7 +67,7 @@ def test_the_port_of_a_server_whose_lines_are_not_over_yet_is_taken_at_once() ->
         at = own.getsockname()
         with socket.create_connection(at):
             line, _ = own.accept()
-            line.close()  # by the server first, as when it dies: its end waits for a minute
+            line.close()  # closed by the server first, as when it dies: the port stays reserved for a minute
     listen(at[1]).close()
 
 
@@ -98,7 +98,7 @@ def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and
         assert running.ask(f"kept/{kept['key']}", "POST", Origin=f"http://127.0.0.1:{running.port}")[0] == 200
         again = page.until(lambda state: state["locked"] == [True])
         assert (again["given"]["settings"], again["parts"], again["model"]["name"]) == (["process.walls=4"], 2, "tee.stl")
-        assert kept["key"] not in [work["key"] for work in json.loads(running.ask("kept")[1])]  # it is kept on there
+        assert kept["key"] not in [work["key"] for work in json.loads(running.ask("kept")[1])]  # the bench continues to keep it
         (left,) = json.loads(running.ask("left")[1])
         assert (left["name"], left["bytes"]) == ("tee.stl", len(TEE))
         own = f"http://127.0.0.1:{running.port}"
@@ -108,7 +108,7 @@ def test_a_workbench_that_follows_a_killed_one_at_its_port_has_another_token_and
         assert running.ask("left/1", "POST", Origin=own)[0] == 422
         problem = page.until(lambda state: state["problem"])["problem"]
         assert problem == "no such file has been left by a workbench that was killed"
-        page.do("set", key="process.scale", value="2")  # for which it is read again
+        page.do("set", key="process.scale", value="2")  # this reads the model again
         page.until(lambda state: state["model"]["size_mm"][0] > 79)
         assert json.loads(running.ask("left")[1]) == [left]  # it stays where it was
         assert running.ask(f"left/{left['key']}", "DELETE", Origin="http://evil.example")[0] == 403

@@ -1,4 +1,4 @@
-"""The workbench as a process: whom it answers, from a file to its plan and parts, and that it ends with all it started."""
+"""The workbench as a process: the clients it answers, from a file to its plan and parts, and the end of all its processes."""
 
 import io
 import json
@@ -138,7 +138,7 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
     (folder / "tee.stl").write_bytes(stl(tee()))
     assert main(["decompose", "tee.stl", *QUICK, "--set=search.seam_mm=100", "--ranker", "learned", "-o", "parts"]) == 0
     with bench.line() as page:
-        page.do("set", key="search.seam_mm", value="100")  # too dear to be cut
+        page.do("set", key="search.seam_mm", value="100")  # too expensive to cut
         page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
         bench.send(folder / "tee.stl")
         page.do("search", ranker="none")
@@ -241,7 +241,7 @@ def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, 
         refused = page.until(lambda state: state["problem"])
         assert refused["problem"].startswith("part 2 cannot be cut off: its plane misses the model")
         page.do("move", part=2, normal=[1, 0, 0], offset_mm=9.5)
-        page.do("lock", part=2, locked=True)  # while the move is under way
+        page.do("lock", part=2, locked=True)  # while the move is in progress
         page.until(lambda state: state["locked"] == [True])
         page.do("search")
         searched = page.until(lambda state: state["undo"] == "find parts" and not state["search"])
@@ -280,7 +280,7 @@ def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_
         assert (parts["name"], ours["findings"]) == ("in 2 parts", f"{len(sliced['findings'])}")
         assert float(other["support"].split()[0]) > float(ours["support"].split()[0])
         assert (ours["seams between parts"] != "0 mm", other["seams between parts"]) == (True, "0 mm")
-        assert bench.ask("print.html")[1] == (folder / "tee.html").read_bytes()  # with the comparison, as of --compare
+        assert bench.ask("print.html")[1] == (folder / "tee.html").read_bytes()  # with the comparison, as with --compare
         page.do("turn", axis="z", deg=30)
         assert page.until(lambda state: state["sliced"]["stale"])["sliced"]["key"] == sliced["key"]
         assert bench.ask("print.gcode")[0] == 422
@@ -340,7 +340,7 @@ def test_copies_and_pauses_are_the_command_line_s_and_their_sentences_name_field
         page.do("add", normal=[0, 0, 1], offset_mm=2.0)
         page.until(lambda state: state["parts"] == 2 and not state["problem"])
         page.do("slice")
-        sentence = "1:2.4mm under Copies and pauses: part 1 is at most 2 mm high"  # both copies are sliced in their parts
+        sentence = "1:2.4mm under Copies and pauses: part 1 is at most 2 mm high"  # both copies are sliced in these parts
         assert page.until(lambda state: state["problem"] == sentence)
         bench.send(folder / "box.stl")
         page.until(lambda state: (state["copies"], state["stops"]) == (1, []))
@@ -365,7 +365,7 @@ def test_another_machine_keeps_all_planes_and_tells_which_it_cannot_cut(bench: R
         page.do("undo")
         page.until(lambda state: state["parts"] == 3 and state["given"]["machine"] == "generic_ac")
         page.do("set", key="process.scale", value="2")
-        assert page.until(lambda state: state["model"]["size_mm"][0] > 79)["parts"] == 3  # the planes go along
+        assert page.until(lambda state: state["model"]["size_mm"][0] > 79)["parts"] == 3  # the planes scale with the model
         page.do("undo")
 
 
@@ -386,7 +386,7 @@ def test_a_machine_sent_as_a_file_keeps_the_settings_that_it_allows_and_names_th
 
 
 def colours_in(picture: bytes) -> set[str]:
-    """Which of the first two parts a picture shows."""
+    """The colours of the first two parts that are in a picture."""
     pixels = np.array(Image.open(io.BytesIO(picture)).convert("RGBA"), dtype=int).reshape(-1, 4)
     red, _, blue = pixels[pixels[:, 3] > 200, :3].T
     return {name for name, more in (("orange", red - blue), ("blue", blue - red)) if (more > 60).any()}
@@ -420,11 +420,11 @@ def test_work_by_hand_is_put_away_when_another_model_is_opened_and_lies_there_as
         page.do("redo")
         page.until(lambda state: name_of(state) == "next.stl")
         (work,) = [work for work in kept() if work["parts"] == 2][-1:]
-        for _ in range(2):  # drawn, then as it was drawn
+        for _ in range(2):  # drawn, then from the cache
             status, picture = bench.ask(f"kept/{work['key']}/picture")
             assert (status, colours_in(picture)) == (200, {"orange", "blue"})
             assert len(picture) < 20_000
-        assert bench.ask("kept/nothing/picture") == (204, b"")  # a page is not told of an error
+        assert bench.ask("kept/nothing/picture") == (204, b"")  # an error is not reported to a page
         assert bench.ask(f"kept/{work['key']}", "POST", Origin=origin)[0] == 200
         again = page.until(lambda state: name_of(state) == "own.stl")
         assert {key: again[key] for key in FOUND} == {key: searched[key] for key in FOUND}
@@ -454,7 +454,7 @@ def test_figures_and_the_list_of_orientations_follow_what_a_hand_does(bench: Run
         page.until(lambda state: state["undo"] == "tilt a plane")
         page.do("undo")
         moved = page.until(lambda state: state["undo"] == "move a plane")
-        assert moved["by_hand"] is None  # not known yet, rather than that of the planes before
+        assert moved["by_hand"] is None  # not known yet, rather than the figures of the previous planes
         by_hand = page.until(lambda state: state["by_hand"])["by_hand"]
         assert (by_hand["parts"], by_hand["planes"]) == (2, moved["cuts"])
         assert by_hand["time_s"] != cut["time_s"]
@@ -478,7 +478,7 @@ def test_pages_that_read_nothing_hold_up_nobody(bench: Running) -> None:
     with bench.line() as page:
         began = time.monotonic()
         for k in range(200):
-            page.do("demo", name=f"{k}{'.' * 50_000}")  # 10 MB for each page, more than any buffer on the way holds
+            page.do("demo", name=f"{k}{'.' * 50_000}")  # 10 MB for each page, more than all buffers between can hold
         page.until(lambda state: state["problem"].startswith("199."))
         assert time.monotonic() - began < 30.0
     for own in deaf:
@@ -490,7 +490,7 @@ def test_ctrl_c_ends_it_within_two_seconds_with_all_it_has_started_even_while_it
 
 
 def ended_s() -> float:
-    """Seconds from Ctrl-C to when a workbench that searches is gone with all that it has started."""
+    """Seconds from Ctrl-C until a searching workbench and all processes that it has started have ended."""
     with workbench("demo:tree") as running:
         with running.line() as page:
             page.until(lambda state: state["model"])

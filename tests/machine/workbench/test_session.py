@@ -1,4 +1,4 @@
-"""A session whose bench changes while work for it is under way: what lies on it at the end is what was asked for last."""
+"""A session whose bench changes while its work is in progress: the bench ends in the state requested last."""
 
 import asyncio
 from collections.abc import Callable, Coroutine
@@ -47,7 +47,7 @@ def _nobody_waits(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def when_done(work: Callable[[Session], Coroutine[Any, Any, None]]) -> Session:
-    """A session with a model on its bench after some work; its processes answer what the work has them answer."""
+    """A session with a model on its bench after some work; its processes give fixed answers unless the work replaces them."""
 
     async def run() -> Session:
         session = Session(load(), Given(), WorkerPools())
@@ -72,13 +72,13 @@ def is_seeking(session: Session) -> bool:
 
 
 async def settled(session: Session) -> None:
-    """Return when no work is under way any more."""
+    """Return when no work is in progress."""
     while session._tasks:
         await asyncio.gather(*session._tasks, return_exceptions=True)
 
 
 def edited(offsets_mm: list[float], edit: dict[str, Any]) -> None:
-    """A list of planes after an edit, as a person would do it; one of a part that is not there changes nothing."""
+    """Edit a list of plane offsets as the user does; an edit of a missing part changes nothing."""
     parts, at = range(2, len(offsets_mm) + 2), edit["part"] - 2
     if edit["do"] == "add" and edit["after"] <= len(parts) + 1:
         offsets_mm.insert(edit["after"] - 1, edit["offset_mm"])
@@ -96,7 +96,7 @@ def test_edits_that_follow_each_other_quickly_leave_what_they_leave_one_by_one(e
     async def work(session: Session) -> None:
         for edit, turns in edits:
             obey(session, edit)
-            for _ in range(turns):  # so far the work for the edits before has come meanwhile
+            for _ in range(turns):  # meanwhile the work of the earlier edits gets this far
                 await asyncio.sleep(0)
 
     offsets_mm: list[float] = []
@@ -106,7 +106,7 @@ def test_edits_that_follow_each_other_quickly_leave_what_they_leave_one_by_one(e
 
 
 def test_figures_follow_the_hand_at_once_and_what_else_is_cut_is_looked_at_when_it_rests() -> None:
-    """The stem of the tee is a square of 10 mm: a rim of 40 mm wherever it is cut."""
+    """The stem of the tee is a square of 10 mm: a cut has a rim of 40 mm at any height."""
     tried: list[tuple[tuple[float, ...], int, float | None]] = []
 
     async def work(session: Session) -> None:
@@ -427,7 +427,7 @@ def test_an_invalid_plane_is_removed_even_if_another_one_is_invalid_without_it()
 
 
 def forbidding(*reasons: tuple[PlannedPart, str]) -> Callable[..., Coroutine[Any, Any, Any]]:
-    """Answers of the processes where these planes cannot be cut; closer trials alone are made."""
+    """Answers of processes that reject these planes; of the other tasks only `stand` has a result."""
 
     async def answer(task: Any, *given: Any, **more: Any) -> Any:
         if task.__name__ != "try_cuts":
@@ -549,7 +549,7 @@ def test_a_search_that_begins_in_the_instant_in_which_another_is_stopped_goes_on
         await asyncio.sleep(0)
         obey(session, {"do": "stop"})
         obey(session, {"do": "search"})
-        for _ in range(3):  # the end of the one that was stopped comes meanwhile
+        for _ in range(3):  # meanwhile the stopped search reports its end
             await asyncio.sleep(0)
         assert is_seeking(session)
 
@@ -635,7 +635,7 @@ def test_prices_go_on_while_the_bench_changes_in_what_does_not_decide_them_and_a
 
 
 def reading_plates(session: Session) -> None:
-    """Have it read files of two plates, and measure no plan."""
+    """Make a session read files of two plates, without measuring a plan."""
 
     async def read(task: Any, *given: Any, **more: Any) -> Any:
         if task.__name__ != "read_model":

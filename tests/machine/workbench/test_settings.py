@@ -1,4 +1,4 @@
-"""Settings on the workbench, of all parts and of single ones, and the command line that does what lies on the bench."""
+"""Settings on the workbench, for all parts and for single ones, and the command line with the same result."""
 
 import json
 import shlex

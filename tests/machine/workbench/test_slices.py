@@ -1,4 +1,4 @@
-"""What the workbench makes of slices: what is seen of a part, whether they can be printed, and G-code with errors."""
+"""Slices on the workbench: the drawing of a part, whether it can be printed, and G-code with errors."""
 
 import asyncio
 from pathlib import Path

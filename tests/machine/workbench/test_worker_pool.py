@@ -1,4 +1,4 @@
-"""The processes that all benches share: how many there are, whose turn it is, who is stopped, and whose work they hold."""
+"""The processes shared by all benches: their number, the order of tasks, stopping, and the benches that use them."""
 
 import asyncio
 from collections.abc import Coroutine
@@ -42,12 +42,12 @@ class Started:
         return self.processes[-1]
 
     async def gone(self, place: int) -> None:
-        """Wait until one of them is gone."""
+        """Wait until a process has ended."""
         await asyncio.to_thread(self.processes[place].process.wait, 30.0)
 
 
 def run(work: Coroutine[Any, Any, Any], *pools: WorkerPool) -> Any:
-    """What work gives; the processes of its pools are ended."""
+    """The result of `work`; afterwards the processes of the pools are ended."""
 
     async def whole() -> Any:
         try:
@@ -60,7 +60,7 @@ def run(work: Coroutine[Any, Any, Any], *pools: WorkerPool) -> Any:
 
 
 async def rank(tasks: TaskQueue) -> float:
-    """The height of the best orientation of a tee: 10 mm, as it lies on its face."""
+    """The height of the best orientation of a tee: 10 mm, lying on its face."""
     resting = await tasks.run(rank_resting, model(), PROFILE)
     height_mm: float = resting[1].height_mm
     return height_mm

@@ -1,4 +1,4 @@
-"""A pause that nobody ends for long: the motors stay on, the nozzle goes off, and the print goes on as if nothing had been."""
+"""Long pauses: the motors stay on, the nozzle cools, and the print continues as if there had been no pause."""
 
 import re
 from collections.abc import Callable
@@ -19,7 +19,7 @@ from tests.machine.peers import happened
 from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 COOLS_S = 120.0
-COLD_S = COOLS_S + 120.0  # twice the time constant of the simulated nozzle later
+COLD_S = COOLS_S + 120.0  # two time constants of the simulated nozzle later
 
 
 def profile_of(dialect: str = "marlin", minutes: float = COOLS_S / 60.0) -> Profile:
@@ -31,14 +31,14 @@ RETRACT_MM = PROFILE.material.retract_mm
 
 
 class Patience(Watcher):
-    """Pauses at line 150 and does things so many seconds after the tip has come to rest."""
+    """Pauses at line 150 and runs actions a given number of seconds after the tip has come to rest."""
 
     def __init__(self, profile: Profile = PROFILE, build: BuildOptions | None = None, faults: FaultScript | None = None) -> None:
         super().__init__(VirtualPrinter(profile.machine, build, faults, most_s=20000.0), profile)
         self.when[150] = self.ask(Command.PAUSE)
         self.paused_s: float | None = None
         self.due: list[tuple[float, Callable[[], None]]] = []
-        self.heard: dict[float, PrintStatus] = {}  # seconds into the pause: what was shown
+        self.heard: dict[float, PrintStatus] = {}  # seconds into the pause -> the status shown
 
     def see(self, progress: PrintStatus) -> None:
         super().see(progress)
@@ -54,13 +54,13 @@ class Patience(Watcher):
         return self
 
     def shown_at(self, seconds: float) -> PrintStatus:
-        """What stood on the screen so long after the tip had come to rest."""
+        """The status shown this many seconds after the tip has come to rest."""
         return self.heard[max(at for at in self.heard if at <= seconds)]
 
 
 @pytest.mark.parametrize(("dialect", "seconds"), [("marlin", 200.0), ("klipper", 700.0), ("reprapfirmware", 200.0)])
 def test_a_pause_longer_than_any_firmware_s_idle_time_keeps_the_motors_on_and_the_place(dialect: str, seconds: float) -> None:
-    """Marlin lets X, Y and Z go after 120 s (Configuration_adv.h), Klipper shuts down after 600 s (idle_timeout.py)."""
+    """Marlin switches X, Y and Z off after 120 s (Configuration_adv.h), Klipper shuts down after 600 s (idle_timeout.py)."""
     watcher = Patience(profile_of(dialect, minutes=0.0)).after(seconds, Command.RESUME)
     assert not watcher.run(PROGRAM).cancelled
     assert not happened(watcher.printer.record, "motors off")
@@ -103,7 +103,7 @@ def test_a_cooled_pause_says_what_will_happen_and_goes_on_to_the_same_print() ->
 
 
 def back_of(watcher: Watcher) -> list[str]:
-    """The commands that heat again and all behind them up to the next command of the program."""
+    """The commands from those that heat again up to the next command of the program."""
     lines = watcher.lines()
     begin = len(lines) - lines[::-1].index("M109 S200") - 1
     return lines[begin : next(index for index in range(begin, len(lines)) if lines[index] in BODY)]

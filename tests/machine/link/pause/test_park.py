@@ -1,4 +1,4 @@
-"""Parking: the way to where the tip waits, and the commands there and back."""
+"""Parking: the path to the parking position, and the commands for the way there and back."""
 
 import re
 
@@ -21,7 +21,7 @@ POSES = [Pose(0.0, 0.0), Pose(30.0, 725.0), Pose(-60.0, 45.0), Pose(85.0, 10.0)]
 
 
 def printing(pose: Pose) -> tuple[PrintedBounds, np.ndarray]:
-    """A print 20 mm wide and 10 mm high in a pose, and where the tip stands on its top, 80 mm above the table."""
+    """A print 20 mm wide and 10 mm high in a pose, and the tip's position on its top, 80 mm above the table."""
     bounds, at = PrintedBounds(MACHINE), machine_points(MACHINE, pose, np.array([[0.0, 0.0, 80.0]]))[0]
     for step in ((-10.0, -10.0, -10.0), (10.0, 10.0, 0.0)):
         bounds.extrude_to((*(at + step), pose.tilt_deg, pose.turn_deg, 0.0))

@@ -1,4 +1,4 @@
-"""Printed bounds: every way of writing a stroke enters the box around the print."""
+"""Printed bounds: a stroke in any notation is included in the box around the print."""
 
 import pytest
 
@@ -12,7 +12,7 @@ START = ("G90", "M83", "G92 E0", "G0 X0 Y0 Z5")
 
 
 def box(*commands: str) -> list[list[float]]:
-    """Least and greatest X Y Z of what these commands print; [] for nothing."""
+    """Minimum and maximum X Y Z printed by these commands; [] if they print nothing."""
     bounds, modal = PrintedBounds(MACHINE), ModalState(axes_of(MACHINE))
     for command in (*START, *commands):
         bounds.track(modal, command)

@@ -1,4 +1,4 @@
-"""Which line an ok answers."""
+"""The matching of each ok to the line that it acknowledges."""
 
 import pytest
 
@@ -85,7 +85,7 @@ def test_after_a_refused_line_the_next_go_one_by_one_and_after_another_for_longe
 
     lines.learn(3)
     assert [take(CLEAN_LINES - 1), take(1), take(100)] == [1, 4, 4]
-    assert lines.places(MARLIN.line, emergency_parser=False) == 3  # a place is left for an M112
+    assert lines.places(MARLIN.line, emergency_parser=False) == 3  # one place is reserved for an M112
     lines.back_off()
     assert [take(0), take(4 * CLEAN_LINES - 1), take(1)] == [1, 1, 4]
     lines.slow_down()

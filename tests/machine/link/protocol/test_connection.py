@@ -1,4 +1,4 @@
-"""The connection on a bench: what a printer says, the clock, and the bytes that the sender writes."""
+"""The connection to a printer, tested on a simulated clock with given answers and recorded bytes."""
 
 import random
 import re
@@ -32,7 +32,7 @@ CHUNKS = pytest.mark.parametrize("size", [1, 3, 10**6])
 
 
 class Table:
-    """A protocol on a bench: say() is the printer, wait() the clock, wire() what the sender wrote since the last look."""
+    """A protocol on a test bench: say() is the printer, wait() the clock, wire() the bytes sent since the last call."""
 
     def __init__(self, size: int = 10**6) -> None:
         self.now_s, self.size = 0.0, size
@@ -58,7 +58,7 @@ class Table:
 
 
 def opened(size: int = 10**6, advanced: bool = True) -> Table:
-    """A greeted printer; the window is open where it tells numbers."""
+    """A greeted printer; its send window is fully open if it reports line numbers."""
     table = Table(size)
     table.wait(0.6)
     table.say(b"ok N0 P15 B3\n" if advanced else b"ok\n")
@@ -145,7 +145,7 @@ def test_a_printer_that_takes_no_greeting_is_told_by_what_it_said() -> None:
 
 
 class Counting:
-    """A firmware that counts lines from `last` on; what it makes of M110 is its own affair."""
+    """A firmware that counts lines from `last` and answers M110 with `m110`."""
 
     def __init__(self, last: int, m110: bytes, takes_numbers: bool = True) -> None:
         self.last, self.m110, self.takes_numbers = last, m110, takes_numbers
@@ -164,7 +164,7 @@ class Counting:
 
 
 def converse(printer: Counting, seconds: float = 40.0) -> Table:
-    """A connection and a printer, until it is open or has failed."""
+    """Run a connection with a printer until it is open or has failed."""
     table = Table()
     while table.now_s < seconds and table.connection.fault is None and table.connection.state is not State.OPEN:
         table.wait(0.1)
@@ -174,8 +174,8 @@ def converse(printer: Counting, seconds: float = 40.0) -> Table:
 
 
 @pytest.mark.parametrize("m110", [
-    b"",  # not known, and not a word about it
-    b"ok\n",  # taken without effect: prusa3d/Prusa-Firmware#232
+    b"",  # unknown, and not answered at all
+    b"ok\n",  # acknowledged without effect: prusa3d/Prusa-Firmware#232
     b"Error:Line Number is not Last Line Number+1, Last Line: 57\nResend: 58\nok\n",
     b"Resend: 58\n",
     b'echo:Unknown command: "M110 N0"\nok\n',
@@ -207,7 +207,7 @@ def test_a_printer_that_answers_only_lines_without_numbers_is_told_from_one_that
 
 
 def test_a_command_that_is_refused_for_ever_is_named_with_the_printers_words() -> None:
-    """OctoPrint/OctoPrint#1468: a Marlin whose display command eats part of its line."""
+    """OctoPrint/OctoPrint#1468: a Marlin whose display command consumes part of its line."""
     table = opened()
     table.send("M117 Printing...")
     for _ in range(11):
@@ -430,7 +430,7 @@ def test_no_conversation_breaks_the_counts(acts: list[tuple[str, int]]) -> None:
 
 
 def greeted_by(name: str, size: int = 10**6) -> Table:
-    """A greeted printer that answers with plain oks and names itself."""
+    """A greeted printer that answers with plain oks and reports its name."""
     table = Table(size)
     table.wait(0.6)
     table.say(b"ok\nFIRMWARE_NAME:" + name.encode() + b"\nok\nok T:20.00 /0.00 B:20.00 /0.00\n")
@@ -526,7 +526,7 @@ def test_two_lines_of_sixty_three_bytes_fill_the_ring_of_an_avr() -> None:
 
 
 def numbered_to(last: int, advanced: bool = True) -> Table:
-    """A greeted printer whose numbers begin anew after `last`."""
+    """A greeted printer whose line numbers restart after `last`."""
     table = Table()
     table.connection = Connection(PATIENT, 0.0)
     table.connection.greeting.firmware = replace(MARLIN, line=replace(MARLIN.line, last_number=last))

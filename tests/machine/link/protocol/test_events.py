@@ -1,4 +1,4 @@
-"""Each line of a printer is read as its event, however its bytes were cut."""
+"""Parsing of each line of a printer as an event, however its bytes are split."""
 
 import pytest
 

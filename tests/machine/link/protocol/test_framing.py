@@ -1,4 +1,4 @@
-"""Framing: numbers and checksums as firmwares want them, and what is refused."""
+"""Framing: line numbers, checksums and refused commands."""
 
 from functools import reduce
 from operator import xor

@@ -1,4 +1,4 @@
-"""The table of states, by conversations: each state is talked into, then something happens that must end or turn it."""
+"""The table of states: conversations that lead into each state, and the event that ends or changes it."""
 
 import re
 from collections.abc import Callable
@@ -27,7 +27,7 @@ def greeting() -> Table:
 
 
 def printing(*happens: bytes | float) -> Table:
-    """Three lines are on their way; then the printer says something, or so many seconds pass."""
+    """Send three lines; then the printer answers, or a number of seconds passes."""
     table = opened()
     table.send("G1 X1", "G1 X2", "G1 X3")
     for said in happens:
@@ -43,9 +43,9 @@ def renumbering() -> Table:
     return table
 
 
-# How a conversation gets into a state, and where it is after: the firmware's last words, its banner, a port that was away.
+# How a conversation reaches a state, and its state after each of: the firmware's last words, its banner, a lost port.
 TALKS: dict[State, tuple[Callable[[], Table], State, State, State]] = {
-    State.DRAIN: (Table, State.DRAIN, State.DRAIN, State.DRAIN),  # all of that may be older than the conversation
+    State.DRAIN: (Table, State.DRAIN, State.DRAIN, State.DRAIN),  # all of these may be older than the conversation
     State.SYNC: (synced, State.HALTED, State.DRAIN, State.SYNC),
     State.HELLO: (greeting, State.HALTED, State.DRAIN, State.HELLO),
     State.OPEN: (printing, State.HALTED, State.LOST, State.PROBING),
@@ -94,7 +94,7 @@ def test_a_printer_that_never_answers_any_more_is_given_up_from_every_state(stat
 
 
 def test_the_diagram_of_the_docs_is_the_table() -> None:
-    """Every arrow of the picture is read back."""
+    """Every arrow of the diagram is in the table, and no other."""
     text = STATES.read_text(encoding="utf-8")
     assert text == diagram(), "run python tools/docs/make_tables.py"
     arrows = {

@@ -1,4 +1,4 @@
-"""A stub of Klipper's API server (docs/API_Server.md): enough for a real Moonraker to take it for a printer that is ready.
+"""A stub of Klipper's API server (docs/API_Server.md), complete enough for a real Moonraker to see a printer that is ready.
 
 Requests are JSON ended by 0x03, on a Unix socket. A print reads its file at a steady rate; nothing moves.
 """
@@ -12,13 +12,13 @@ import threading
 from pathlib import Path
 from typing import Any
 
-PRINT_S = 4.0  # a whole file takes so long
+PRINT_S = 4.0  # duration of a print, whatever its file
 TICK_S = 0.1
 START = re.compile(r'SDCARD_PRINT_FILE FILENAME="(.+)"')
 
 
 class KlippyStub:
-    """`with KlippyStub(socket, gcodes) as klippy:` klippy.scripts are the G-code lines it was given."""
+    """`with KlippyStub(socket, gcodes) as klippy:` klippy.scripts are the G-code lines that it received."""
 
     def __init__(self, socket: Path, gcodes: Path) -> None:
         self.scripts: list[str] = []

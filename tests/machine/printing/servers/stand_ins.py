@@ -1,4 +1,4 @@
-"""Stand-ins: small print servers in this process that speak each protocol strictly: what the real one refuses, they refuse."""
+"""Stand-ins for print servers, in this process, that are as strict about their protocols as the real ones."""
 
 from __future__ import annotations
 
@@ -25,24 +25,24 @@ KEY = "workshop-key-0815"
 
 
 class Job:
-    """What all servers do: keep files, print one, step by step as it is looked at. asked: all that was asked for, in order."""
+    """A server's files and its print, which advances at each query. asked: all requests in order."""
 
     def __init__(self) -> None:
         self.files: dict[str, bytes] = {}
         self.asked: list[str] = []
         self.state, self.file, self.position = "idle", "", 0
-        self.steps = 4  # looks that a print takes
+        self.steps = 4  # queries until a print is done
         self.commands: list[str] = []
         self.halted = False
-        self.up_s = 3600  # since it was switched on
-        self.refuse: dict[str, tuple[int, str]] = {}  # path -> status and words that are answered instead
-        self.break_off: str = ""  # path during whose body the server goes away
+        self.up_s = 3600  # uptime in seconds
+        self.refuse: dict[str, tuple[int, str]] = {}  # path -> status and text of the answer instead
+        self.break_off: str = ""  # path during whose body the server breaks off
 
     def start(self, file: str) -> None:
         self.state, self.file, self.position = "printing", file, 0
 
     def restart(self) -> None:
-        """It has died and comes back: it knows of no print."""
+        """Restart after a crash, without the print."""
         self.state, self.file, self.position, self.up_s = "idle", "", 0, 5
 
     def look(self) -> None:
@@ -92,7 +92,7 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.write(text)
 
     def form(self, body: bytes) -> dict[str, tuple[str, bytes]]:
-        """Name -> file name and content, of a form that must be complete."""
+        """Name -> file name and content, of a multipart form, which must be complete."""
         boundary = re.fullmatch(r"multipart/form-data; boundary=(\S+)", self.headers["Content-Type"])
         assert boundary is not None
         mark = b"--" + boundary[1].encode()
@@ -109,7 +109,7 @@ class Handler(BaseHTTPRequestHandler):
 
 
 class OctoPrintStandIn(Handler):
-    """As octoprint/server/api of 1.11.8."""
+    """OctoPrint 1.11.8, as in octoprint/server/api."""
 
     def answer(self, method: str, path: str, query: dict[str, str], body: bytes) -> tuple[int, Any]:
         job = self.job
@@ -172,7 +172,7 @@ BUILT_IN = (
 
 
 class MoonrakerStandIn(Handler):
-    """As Moonraker 0.11 before a Klipper that is ready. scans: whether it has read the files that it holds."""
+    """Moonraker 0.11 with a Klipper that is ready. scans: whether it has read the files that it stores."""
 
     steppers = ("stepper_a", "stepper_c")
     macros = ("HOME_AB",)
@@ -247,7 +247,7 @@ class MoonrakerStandIn(Handler):
 
 
 class DuetStandIn(Handler):
-    """As RepRapFirmware 3.5's HttpResponder: a session by its key, upper case escapes, a CRC, M0 while it is paused only."""
+    """RepRapFirmware 3.5, as in its HttpResponder: a session by its key, upper-case escapes, a CRC, M0 only while paused."""
 
     sessions: set[str]
 
@@ -339,7 +339,7 @@ class _Server(ThreadingHTTPServer):
     daemon_threads = True
 
     def handle_error(self, request: object, client_address: object) -> None:
-        """A client that hangs up is no fault of the test."""
+        """Ignore clients that hang up."""
         if not isinstance(sys.exception(), ConnectionError):
             super().handle_error(request, client_address)
 
@@ -348,7 +348,7 @@ class _Server(ThreadingHTTPServer):
 def stand_in(
     kind: str, key: str = KEY, certificate: Path | None = None, handler: type[Handler] | None = None, **more: Any
 ) -> Iterator[tuple[Job, str]]:
-    """A print server of a kind: its job and the address of it. certificate: a PEM file with its key, for TLS."""
+    """A print server of a kind: its job and its address. certificate: a PEM file with its key, for TLS."""
     job = Job()
     bound = type(kind, (handler or STAND_INS[kind],), {"job": job, "key": key, "sessions": set(), **more})
     server = _Server(("127.0.0.1", 0), bound)
@@ -366,5 +366,5 @@ def stand_in(
 
 
 def session_with(address: str, tell: Tell | None = None) -> AbstractContextManager[PrintServer]:
-    """A session with the server of an address. tell: what goes over the line."""
+    """A session with the server of an address. tell: receives every line exchanged."""
     return open_server(parse_server_address(address), tell)

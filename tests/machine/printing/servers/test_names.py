@@ -1,4 +1,4 @@
-"""Addresses, names of files and the user's file of keys."""
+"""Server addresses, file names and the user's file of keys."""
 
 import os
 from collections.abc import Iterator

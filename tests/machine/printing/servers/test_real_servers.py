@@ -1,9 +1,9 @@
-"""The servers themselves, where they are installed: variables name the programs.
+"""The real servers, if they are installed; environment variables name the programs.
 
 TILTPRINT_OCTOPRINT=/path/to/octoprint          with its own virtual printer (pip install OctoPrint==1.11.8)
-TILTPRINT_MOONRAKER=/path/to/moonraker          before a stub of Klipper's API server (pip install moonraker==0.11.0)
+TILTPRINT_MOONRAKER=/path/to/moonraker          with a stub of Klipper's API server (pip install moonraker==0.11.0)
 
-Each server needs an environment of its own.
+Each server needs its own Python environment.
 """
 
 import os
@@ -103,7 +103,7 @@ def octoprint(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[str]:
 
 @pytest.fixture
 def moonraker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[tuple[str, KlippyStub]]:
-    """The address of a Moonraker and the Klipper behind it; the key is the one that it has made for itself."""
+    """The address of a Moonraker and the Klipper behind it; the key is the one that Moonraker has generated."""
     for folder in ("config", "gcodes", "logs", "database"):
         (tmp_path / folder).mkdir()
     port, uds = free_port(), tmp_path / "klippy.sock"
@@ -133,7 +133,7 @@ Steps = Callable[[PrintStatus, Control], None]
 
 
 def print_on(address: str, steps: Steps) -> tuple[PrintState, list[PrintState]]:
-    """How a print ends that is given orders on the way, and the phases it was seen in."""
+    """How a print that receives commands ends, and the phases observed."""
     phases: list[PrintState] = []
     control = Control()
 
@@ -158,7 +158,7 @@ def pause_resume_cancel() -> Steps:
 
 
 def only_watch(status: PrintStatus, control: Control) -> None:
-    """Ask for nothing."""
+    """Request nothing."""
 
 
 def stop_at_once(status: PrintStatus, control: Control) -> None:
@@ -167,7 +167,7 @@ def stop_at_once(status: PrintStatus, control: Control) -> None:
 
 
 def check_broken_off(address: str) -> None:
-    """A person who interrupts an upload leaves nothing of it."""
+    """An upload that the user interrupts leaves nothing on the server."""
     large = GcodeUpload("broken.gcode", PASSES * 200)
 
     def interrupt(count: int) -> None:

@@ -1,4 +1,4 @@
-"""Each kind of server: a file handed over, printed, paused, cancelled, halted; refusals and broken lines as sentences."""
+"""Each kind of server: a file uploaded, printed, paused, cancelled, stopped; refusals and lost connections as sentences."""
 
 import contextlib
 import random
@@ -29,7 +29,7 @@ from tests.machine.printing.servers.stand_ins import KEY, STAND_INS, Job, sessio
 
 LINES = tuple(f"G1 X{k}" for k in range(20_000))
 UPLOAD = GcodeUpload("box.gcode", LINES)
-STATUS = ("/api/job", "/server/info", "/rr_model")  # where the kinds tell what they do
+STATUS = ("/api/job", "/server/info", "/rr_model")  # the paths at which the kinds report their status
 every_kind = pytest.mark.parametrize("kind", KINDS)
 
 
@@ -57,7 +57,7 @@ def hand_over(server: PrintServer) -> str:
 
 @contextlib.contextmanager
 def printing(kind: str, **more: Any) -> Iterator[tuple[Job, PrintServer]]:
-    """A server that has the file, and takes long to print it."""
+    """A server that has the file and takes long to print it."""
     with stand_in(kind, **more) as (job, address), session_with(address) as server:
         hand_over(server)
         job.steps = 10_000
@@ -170,7 +170,7 @@ def test_a_stop_for_which_the_key_cannot_be_read_is_told_as_not_confirmed() -> N
     ],
 )
 def test_only_the_print_that_was_left_is_cancelled(kind: str, printed: str, file: str, away_s: float, reason: str | None) -> None:
-    with stand_in(kind) as (job, address):  # which has been printing for 12 s
+    with stand_in(kind) as (job, address):  # it has been printing for 12 s
         job.files[printed] = UPLOAD.content
         job.steps = 10_000
         job.start(printed)
@@ -191,7 +191,7 @@ def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
     control = Control()
     with printing(kind) as (job, server):
         control.ask(Command.FEED, 120.0)
-        control.ask(Command.FLOW, 900.0)  # not possible: told, not sent
+        control.ask(Command.FLOW, 900.0)  # not possible: reported, not sent
 
         def stop(status: PrintStatus, message: str) -> None:
             if job.commands:
@@ -210,7 +210,7 @@ def test_a_z_offset_is_the_firmwares_own_command_and_bounded(kind: str, sent: st
     control, told = Control(), set[tuple[float, str]]()
     with printing(kind) as (job, server):
         control.ask(Command.BABYSTEP, -0.01)
-        control.ask(Command.BABYSTEP, 2.5)  # not possible: told, not sent
+        control.ask(Command.BABYSTEP, 2.5)  # not possible: reported, not sent
 
         def stop(status: PrintStatus, message: str) -> None:
             told.add((status.z_offset_mm, message))
@@ -227,7 +227,7 @@ def test_a_z_offset_is_the_firmwares_own_command_and_bounded(kind: str, sent: st
 
 def test_z_offsets_that_wait_for_a_slow_server_are_bounded_together() -> None:
     control = Control()
-    for _ in range(3):  # the server has carried out none of them before the last is taken
+    for _ in range(3):  # the server executes none of them before the last is accepted
         control.ask(Command.BABYSTEP, -0.9)
     with printing("moonraker") as (job, server):
 
@@ -252,7 +252,7 @@ def test_a_z_offset_that_klipper_would_keep_for_the_next_print_is_taken_back(end
                 job.steps = 1
             elif status.state is PrintState.PRINTING and not job.commands:
                 control.ask(Command.BABYSTEP, -0.05)
-                job.commands.append("M400")  # asked for once
+                job.commands.append("M400")  # requested once
 
         follower = Follower(server, UPLOAD.name, 1, on_status=watch, control=control, left=left, babystep=server.babystep)
         assert follower.run() is end
@@ -587,7 +587,7 @@ def test_a_server_that_says_nothing_or_nonsense_is_a_sentence(monkeypatch: pytes
 
 @pytest.fixture(scope="module")
 def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A key and a certificate for 127.0.0.1 that it has signed itself."""
+    """A key and its self-signed certificate for 127.0.0.1."""
     if shutil.which("openssl") is None:
         pytest.skip("openssl makes the certificate")
     file = tmp_path_factory.mktemp("tls") / "server.pem"
@@ -668,7 +668,7 @@ def test_an_answer_that_drips_is_not_waited_for(monkeypatch: pytest.MonkeyPatch)
 
 
 class Unanswered:
-    """A server that takes the order to start without an answer; status() calls what it is given."""
+    """A server that receives the order to start without answering it; status() calls the given function."""
 
     name, tells_percents = "octoprint:host", True
 

@@ -1,4 +1,4 @@
-"""A machine without firmware: a tip over a probed table, moved at once, whose every height over what stands there is noted."""
+"""A simulated probe without firmware: it moves at once over a probed table and records its least distance to table and ball."""
 
 from math import isnan
 
@@ -12,12 +12,12 @@ from tests.machine.setup.calibration.misaligned import misaligned
 from tests.machine.simulator.faulty_table import FaultyTable
 
 RADIUS_MM, HEIGHT_MM = 10.0, 45.0
-PLACED_MM = 2.0  # by which a person puts the ball elsewhere
+PLACED_MM = 2.0  # how far from its expected position the user puts the ball
 STEPS = 8
 
 
 class DirectProber:
-    """Implements Prober; least_mm: how near the tip has come to table or ball outside of seeking."""
+    """Implements Prober; least_mm: the least distance of the tip from table or ball outside of seeking."""
 
     def __init__(self, table: ProbedTable, z_mm: float) -> None:
         self.table, self.least_mm = table, float("inf")
@@ -40,7 +40,7 @@ class DirectProber:
         return None if isnan(stop) else stop
 
     def _go(self, end: list[float]) -> None:
-        # What has just been touched is left straight up: that is no contact.
+        # Leaving a touched point straight up is not a contact.
         rises = end[2] > self.at[2] and end[:2] == self.at[:2]
         for share in np.linspace(1.0 if rises else 0.0, 1.0, 1 if rises else STEPS):
             x, y, z, tilt, turn = ((1.0 - share) * np.array(self.at) + share * np.array(end)).tolist()
@@ -50,12 +50,12 @@ class DirectProber:
 
 
 def usual_ball(machine: Machine) -> Ball:
-    """Where the ball is told to stand."""
+    """The position at which the user is instructed to put the ball."""
     return Ball(RADIUS_MM, (min(0.6 * machine.table.radius_mm, 45.0), 0.0, HEIGHT_MM))
 
 
 def probed(machine: Machine, seed: int, noise_mm: float = 0.0, **table: object) -> tuple[Measuring, DirectProber]:
-    """A measurement on a machine that is not as its profile says, with a ball that stands a little elsewhere."""
+    """A measurement on a machine that differs from its profile, with a ball that is slightly displaced."""
     random = np.random.default_rng(seed)
     real, ball = misaligned(machine, random), usual_ball(machine)
     x, y = (float(value) for value in ball.centre_mm[:2] + random.uniform(-PLACED_MM, PLACED_MM, 2))

@@ -1,4 +1,4 @@
-"""Machines whose axes are not where, nor directed as, the profile says, and how far off what is predicted of them is."""
+"""Machines whose axes differ from the profile in position and direction, and the errors of predictions about them."""
 
 import numpy as np
 
@@ -13,7 +13,7 @@ MOST_MM, MOST_DEG = 2.0, 1.0
 
 
 def misaligned(machine: Machine, random: np.random.Generator) -> Machine:
-    """Centres up to 2 mm and zeros and directions up to 1 degree off, the signs anyhow.
+    """Centres up to 2 mm and zeros and directions up to 1 degree off, with random signs.
 
     A lean of the turn axis about the tilt axis is the tilt's zero, so the turn axis leans along the tilt axis only.
     """
@@ -39,7 +39,7 @@ def touches_at(
     noise_mm: float,
     random: np.random.Generator,
 ) -> list[Touch]:
-    """Touches of a mark at each tilt and so many turns evenly around."""
+    """Touches of a mark at each tilt and a number of evenly spaced turns."""
     poses = [Pose(tilt, 360.0 * k / turns) for tilt in tilts for k in range(turns)]
     places = [machine_points(real, pose, np.array([mark]))[0] + random.normal(0.0, noise_mm, 3) for pose in poses]
     return [Touch(pose, (float(x), float(y), float(z))) for pose, (x, y, z) in zip(poses, places, strict=True)]
@@ -48,7 +48,7 @@ def touches_at(
 def prediction_errors_mm(
     found: Machine, real: Machine, radius_mm: float, height_mm: float, tilts: tuple[float, float], random: np.random.Generator
 ) -> Floats:
-    """How far the tip would be from points of a cylinder on the plate, at poses all over the tilts."""
+    """Distances of the tip from points of a cylinder on the plate, at poses over the whole range of tilts."""
     off = []
     for tilt, turn in zip(random.uniform(*tilts, 40), random.uniform(-180.0, 180.0, 40), strict=True):
         radius, angle = radius_mm * np.sqrt(random.random(20)), random.uniform(0.0, 2.0 * np.pi, 20)

@@ -1,8 +1,8 @@
-"""A person at the keyboard, for what asks by input()."""
+"""Simulated keyboard input for input()."""
 
 
 class Person:
-    """Someone who types these lines, then Ctrl-C."""
+    """A user who types these lines, then Ctrl-C."""
 
     def __init__(self, *lines: str) -> None:
         self.lines, self.asked = list(lines), list[str]()

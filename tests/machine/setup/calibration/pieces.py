@@ -1,4 +1,4 @@
-"""Pieces as they would be printed, without a program: pads at the poses that a machine has for roofs to four sides."""
+"""Calibration pieces as they would be printed, without a program: pads on roofs facing four sides, at poses of a machine."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ MIDDLE_MM = 17.0, 23.0
 
 
 def standing(machine: Machine, lean_deg: float = 60.0) -> Piece:
-    """The piece whose pads are in the middle of roofs that lean so."""
+    """The piece whose pads are in the middle of roofs with this lean."""
     return Piece(machine, level(machine), tuple(_pad(machine, number, lean_deg) for number in range(1, 5)))
 
 
@@ -29,7 +29,7 @@ def _pad(machine: Machine, number: int, lean_deg: float) -> Pad:
 
 
 def read_off(exact_mm: Floats, random: np.random.Generator) -> Floats:
-    """What a person reads of pads that lie so: half marks and twentieths of a mm, not quite sure, the plastic a bit too high."""
+    """Readings of pads by a user: rounded to 0.05 mm, with some noise and the plastic slightly too high."""
     seen = exact_mm + random.normal(0.0, 0.03, exact_mm.shape) + np.array([0.0, 0.03, 0.05])
     rounded: Floats = np.round(seen / 0.05) * 0.05
     return rounded
@@ -38,11 +38,11 @@ def read_off(exact_mm: Floats, random: np.random.Generator) -> Floats:
 def off(machine: Machine, random: np.random.Generator) -> Machine:
     """Centres up to 0.4 mm and the tilt's zero up to 0.4 degrees off."""
     tilt, turn = (np.array(axis.point_mm) + random.uniform(-0.4, 0.4, 3) for axis in (machine.tilt, machine.turn))
-    turn[2] = machine.turn.point_mm[2]  # at which height the plate is, no pad tells
+    turn[2] = machine.turn.point_mm[2]  # no pad shows the height of the plate
     zero = {"zero_deg": machine.tilt.zero_deg + float(random.uniform(-0.4, 0.4)), "point_mm": tuple(tilt.tolist())}
     return really(machine, zero, {"point_mm": tuple(turn.tolist())})
 
 
 def seam_mm(piece: Piece, found: Machine, true: Machine) -> float:
-    """How far pads of the next piece would lie from their places."""
+    """The distance of the pads of the next piece from their places."""
     return float(np.linalg.norm(replace(piece, machine=found).laid_aside_mm(true), axis=1).max())

@@ -1,4 +1,4 @@
-"""Touches by keys: a machine at a port whose tip a person takes onto a mark, a step at a time."""
+"""Touches by keys: the user moves the tip of a machine at a port onto a mark in steps."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -34,7 +34,7 @@ def _folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 class Mover:
-    """Goes wherever it is sent, and keeps what it was told."""
+    """Goes wherever it is sent, and records its moves."""
 
     def __init__(self) -> None:
         self.at_mm, self.pose, self.turned_at_mm = [0.0, 0.0, 150.0], Pose(0.0, 0.0), list[float]()
@@ -50,11 +50,11 @@ class Mover:
         self.turned_at_mm.append(self.at_mm[2])
 
     def arrive(self) -> None:
-        """It is always there."""
+        """Every move has already ended."""
 
 
 def steady_hand(mover: Mover, real: Machine) -> Iterator[str]:
-    """Keys that take the tip onto the mark of a real machine, as near as the smallest step allows, again and again."""
+    """Keys that move the tip onto the mark of a real machine, as near as the smallest step allows, again and again."""
     for _ in range(MOST_KEYS):
         away = machine_points(real, mover.pose, np.array([MARK]))[0] - np.array(mover.at_mm)
         axis = int(np.abs(away).argmax())
@@ -73,7 +73,7 @@ def test_a_steady_hand_takes_twelve_touches_to_a_hundredth() -> None:
     exact = [machine_points(real, touch.pose, np.array([MARK]))[0] for touch in touches]
     assert len(touches) == 12
     assert np.abs([touch.at_mm for touch in touches] - np.array(exact)).max() <= 0.5 * STEPS_MM["4"] + 1e-9
-    assert min(mover.turned_at_mm) == plan.safe_z_mm  # the table turns under a tip that is over all that turns
+    assert min(mover.turned_at_mm) == plan.safe_z_mm  # the table turns under a tip that is above all bodies that turn
 
 
 def test_a_touch_is_left_out_and_one_is_taken_again() -> None:
@@ -86,7 +86,7 @@ def test_a_touch_is_left_out_and_one_is_taken_again() -> None:
 
 
 def mover_height(expected_z_mm: float) -> float:
-    """Where a touch begins: 8 mm over the mark."""
+    """The height at which a touch begins: 8 mm above the mark."""
     return expected_z_mm + 8.0
 
 
@@ -131,7 +131,7 @@ def test_the_command_saves_what_a_hand_has_touched_and_leaves_the_machine_level_
     real, mover = really(GENERIC, {"point_mm": (0.0, 0.8, -13.0)}, {"point_mm": (0.5, -0.4, 0.0)}), Mover()
 
     class Followed(calibrate_by_keys.PrinterMover):
-        """A mover at a real port of which the hand sees where it is."""
+        """A mover at a real port that also reports its position to the simulated hand."""
 
         def rise(self, z_mm: float) -> None:
             super().rise(z_mm)

@@ -1,4 +1,4 @@
-"""The calibrate command from the program to the saved profile, by a sheet."""
+"""The calibrate command with a sheet, from the program to the saved profile."""
 
 import tomllib
 from pathlib import Path

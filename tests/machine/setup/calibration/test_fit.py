@@ -1,4 +1,4 @@
-"""A simulated machine with wrong centres, signs and zeros is found from touches of one mark."""
+"""The fit of centres, signs and zeros of a simulated machine to touches of one mark."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The axes that readings of a calibration piece tell, held against machines whose axes are known."""
+"""The axes derived from readings of a calibration piece, compared with machines whose axes are known."""
 
 from dataclasses import replace
 

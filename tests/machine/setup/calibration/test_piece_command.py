@@ -1,4 +1,4 @@
-"""`demo:calibration` as a user has it: exported, read back, its readings typed on the page or in a command, its numbers saved."""
+"""`demo:calibration` for a user: exported, read back, its readings typed on the page or in a command, its numbers saved."""
 
 import json
 import tomllib
@@ -64,7 +64,7 @@ def test_what_a_true_machine_lays_down_is_as_far_aside_as_is_told(program: Parse
 
 
 def _mean_shift_mm(program: ParsedProgram, true: object, part: int, near_mm: np.ndarray) -> np.ndarray:
-    """How far the plastic of a part near a place is from where it should be, on the mean."""
+    """Mean displacement of the plastic of a part near a point from its intended position."""
     axes = program.end[(program.kind == MoveKind.EXTRUDE) & (program.part == part)]
     meant = workpiece_path(GENERIC, axes)
     near = np.linalg.norm(meant - near_mm, axis=1) < 12.0
@@ -190,7 +190,7 @@ def test_the_page_tells_the_same_corrections_and_the_command_that_saves_them(pro
 
 
 def _numbers(piece: Piece) -> list[str]:
-    """What the page should show of the corrected axes; one step of the least squares and all of them agree to a micrometre."""
+    """The corrected axes as the page should show them; one least-squares step and the full fit agree to a micrometre."""
     found = correct(GENERIC, [piece], parse_readings(READINGS)[None])
     turn = " ".join(f"{letter}{value:.3f}" for letter, value in zip("XYZ", found.machine.turn.point_mm, strict=True))
     return [turn, f"{found.sigma[4]:.3f}"]

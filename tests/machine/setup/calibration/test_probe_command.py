@@ -1,4 +1,4 @@
-"""calibrate --probe over a real port: the profile that it saves, and what is left of a probe that fails."""
+"""calibrate --probe over a real port: the profile that it saves, and the state after a failed probe."""
 
 from math import inf
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A misaligned machine measures itself, touches nothing but the ball, and stops with one sentence when its probe fails."""
+"""A misaligned machine measures itself, touches only the ball, and stops with one sentence when its probe fails."""
 
 from math import sqrt
 

@@ -1,4 +1,4 @@
-"""The calibration program is clear of everything on every machine that tilts."""
+"""The calibration program avoids collisions on every machine that tilts."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A calibrated profile in the user's own folder: what a person has written there stays."""
+"""A calibrated profile in the user's own folder: existing settings of the user are kept."""
 
 import tomllib
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""The sheet of touches: what is wrong in it is said, what is not filled in is left out."""
+"""The sheet of touches: errors in it are reported, and empty rows are left out."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Touches of one mark by a machine that is not as its profile says."""
+"""Touches of one mark by a machine that differs from its profile."""
 
 import numpy as np
 
@@ -19,12 +19,12 @@ def machine_of(name: str) -> Machine:
 
 
 def really(machine: Machine, tilt: Wrong, turn: Wrong) -> Machine:
-    """The machine as it really is, where the profile has other numbers."""
+    """The real machine, with other values than the profile's."""
     return machine.model_copy(update={"tilt": machine.tilt.model_copy(update=tilt), "turn": machine.turn.model_copy(update=turn)})
 
 
 def touched(machine: Machine, tilts: tuple[float, ...] = (0.0, 40.0, -40.0), noise_mm: float = 0.0, seed: int = 0) -> list[Touch]:
-    """X Y Z of a real machine with the tip on the mark, at four turns and each tilt."""
+    """X Y Z of a real machine with the tip on the mark, at four turns for each tilt."""
     random = np.random.default_rng(seed)
     touches = []
     for pose in [Pose(tilt, turn) for tilt in tilts for turn in (0.0, 90.0, 180.0, 270.0)]:
@@ -34,7 +34,7 @@ def touched(machine: Machine, tilts: tuple[float, ...] = (0.0, 40.0, -40.0), noi
 
 
 def off_mm(fitted: Calibration, real: Machine) -> float:
-    """How far the found centres are from the real ones, at most; the tilt's across its own axis."""
+    """Greatest error of the fitted centres; the tilt's error only across its own axis."""
     along = np.array(real.tilt.axis) / np.linalg.norm(real.tilt.axis)
     tilt = np.subtract(fitted.machine.tilt.point_mm, real.tilt.point_mm)
     tilt = tilt - along * (along @ tilt)

@@ -1,4 +1,4 @@
-"""Sheets of coupons whose truth is known: strengths of joints and bars, with scatter."""
+"""Sheets of coupons with known strengths of joints and bars, with scatter."""
 
 import numpy as np
 
@@ -17,8 +17,8 @@ WHOLE_MPA = {"z": 24.0, "x": 40.0}
 def broken(
     ratios: tuple[float, ...], plates: int, scatter: float = 0.0, seed: int = 0, joint_mpa: float = 12.0, shape: Shape = BEND
 ) -> Sheet:
-    """A sheet of bars whose joints hold joint_mpa, by a factor's other value so many times as much; every strength is off by the
-    scatter, a whole plate by half of it."""
+    """A sheet of bars whose joints hold joint_mpa, multiplied by a ratio for each factor at its other value; every strength has
+    random scatter, and each whole plate half as much."""
     random = np.random.default_rng(seed)
     rows, loads = signs(len(ratios)), [[] for _ in KINDS]
     for _ in range(plates):

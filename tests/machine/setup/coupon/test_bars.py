@@ -1,4 +1,4 @@
-"""Bars of a coupon: their outlines by closed formulas and the published measures, and the stress that a load brings."""
+"""Bars of a coupon: their outlines by closed formulas and the published dimensions, and the stress caused by a load."""
 
 from itertools import combinations
 from math import cos, pi, radians, sin
@@ -16,7 +16,7 @@ def area(loop: Floats) -> float:
 
 
 def width_at(loop: Floats, s_mm: float) -> float:
-    """Of an outline symmetrical about u = 0, by interpolation along its right side."""
+    """Width of an outline that is symmetrical about u = 0, by interpolation along its right side."""
     right = loop[loop[:, 0] > 0.0]
     right = right[np.argsort(right[:, 1])]
     return 2.0 * float(np.interp(s_mm, right[:, 1], right[:, 0]))
@@ -27,7 +27,7 @@ def test_the_dumbbell_has_the_measures_of_iso_527_2_type_5a() -> None:
     assert np.ptp(loop, axis=0).tolist() == pytest.approx([12.5, 75.0])
     assert [width_at(loop, s) for s in (-12.5, 0.0, 12.5)] == pytest.approx([4.0, 4.0, 4.0])
     assert [width_at(loop, s) for s in (-37.0, 25.1, 37.0)] == pytest.approx([12.5, 12.5, 12.5])  # 50 mm between the grips
-    start = np.array([2.0 + 12.5, 12.5])  # middle of the larger arc, 12.5 mm, which leaves the narrow part without a kink
+    start = np.array([2.0 + 12.5, 12.5])  # middle of the larger arc, 12.5 mm, which joins the narrow part without a kink
     arc = loop[(loop[:, 0] > 0.0) & (loop[:, 1] > 12.4) & (loop[:, 1] < 20.0)]
     assert np.hypot(*(arc - start).T) == pytest.approx(np.full(len(arc), 12.5))
 

@@ -1,4 +1,4 @@
-"""The coupon command: program, simulated print, sheet, own profiles and report; or asked for the loads one by one."""
+"""The coupon command: program, simulated print, sheet, own profiles and report; or a dialogue for the loads."""
 
 import re
 import tomllib

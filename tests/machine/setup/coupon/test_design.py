@@ -1,4 +1,4 @@
-"""Design of a coupon: factors balanced over its bars, and what a bar cannot have of its own."""
+"""Design of a coupon: factors balanced over its bars, and settings that a single bar cannot have."""
 
 from itertools import combinations
 

@@ -1,4 +1,4 @@
-"""What break loads say: exact without scatter, the true winners with it, and which effects too few bars cannot tell."""
+"""The fit of break loads: exact without scatter, the true winners with it, and effects that too few bars cannot separate."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from machine.setup.coupon.fit import evaluate, student_beyond
 from profiles.errors import ProfileError
 from tests.machine.setup.coupon.sheets import FACTORS, WHOLE_MPA, broken
 
-TRUTH = (1.25, 0.8, 1.25, 1.0)  # overlap and heat help, more flow harms, more solid layers change nothing
+TRUTH = (1.25, 0.8, 1.25, 1.0)  # overlap and heat help, more flow harms, more solid layers have no effect
 WINNERS = {"interface_overlap": 0.75, "interface_temperature_add_c": 20.0}
 NAN = float("nan")
 

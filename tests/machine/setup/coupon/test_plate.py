@@ -1,4 +1,4 @@
-"""A coupon's plate: bars that stand clear of each other, parts in an order that the head can print, on the machines that ship."""
+"""A coupon's plate on the shipped machines: bars that do not touch, and parts in an order that the head can print."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""The sheet of a coupon: written, read back, and what cannot stand in it."""
+"""The sheet of a coupon: written, read back, and checked for wrong entries."""
 
 from math import isnan
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Whatever is cut off or damaged of what a firmware tells: a machine is found in it, or it is refused in one sentence."""
+"""Truncated or damaged answers of a firmware: a machine is found in them, or they are refused in one sentence."""
 
 import random
 

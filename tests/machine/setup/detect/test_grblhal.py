@@ -1,4 +1,4 @@
-"""What grblHAL tells of its machine: $$ and $I."""
+"""Detection of a machine from grblHAL's answers to $$ and $I."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""What Klipper tells of its machine: printer.cfg with its includes, or configfile over Moonraker."""
+"""Detection of a machine from Klipper's printer.cfg with its includes, or from configfile over Moonraker."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""What LinuxCNC's .ini tells of a machine."""
+"""Detection of a machine from LinuxCNC's .ini file."""
 
 import pytest
 

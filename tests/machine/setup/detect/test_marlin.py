@@ -1,4 +1,4 @@
-"""What Marlin tells of its machine: M115, M503, M211, as a log or at a port."""
+"""Detection of a machine from Marlin's answers to M115, M503 and M211, as a log or at a port."""
 
 import re
 

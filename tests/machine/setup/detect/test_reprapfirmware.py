@@ -1,4 +1,4 @@
-"""What a RepRapFirmware tells of its machine: config.g, or the object model of M409."""
+"""Detection of a machine from RepRapFirmware's config.g, or from the object model of M409."""
 
 import json
 

@@ -1,4 +1,4 @@
-"""The gate: what a device of the network gets before it is paired, when it is, and when it is let go."""
+"""The gate: responses to a device of the network before it is paired, when it is, and after it is removed."""
 
 import asyncio
 import re
@@ -22,12 +22,12 @@ LAN = Lan((ADDRESS,), ("workshop", "workshop.local"))
 
 
 async def workbench(scope: Scope, receive: Receive, send: Send) -> None:
-    """Stands in for the workbench: says of which device a request is."""
+    """Stands in for the workbench: reports the device from which a request comes."""
     await PlainTextResponse(f"the workbench, device {scope[DEVICE]}")(scope, receive, send)
 
 
 class Network:
-    """A gate and what is said at its terminal; time goes by when the test says so."""
+    """A gate and its output at the terminal; the test advances the time."""
 
     def __init__(self, lan: Lan = LAN) -> None:
         self.said: list[str] = []
@@ -38,7 +38,7 @@ class Network:
 
     @property
     def code(self) -> str:
-        """The one that was told last."""
+        """The pairing code printed last."""
         return next(found[0] for line in reversed(self.said) if (found := re.search(r"[A-Z2-9]{4}-[A-Z2-9]{4}", line)))
 
     def device(self, own: str = OWN) -> httpx.AsyncClient:

@@ -1,4 +1,4 @@
-"""How the workbench is opened to the network: addresses, ports, certificates."""
+"""Opening the workbench to the network: addresses, ports, certificates."""
 
 import shutil
 import socket
@@ -22,7 +22,7 @@ def network(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="module")
 def certificates(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A folder with two certificates, a.pem and b.pem, and their keys, a.key, b.key and locked.key, that of a by a password."""
+    """A folder with certificates a.pem and b.pem and their keys: a.key, b.key, and locked.key, which is a.key with a password."""
     folder = tmp_path_factory.mktemp("certificates")
 
     def openssl(*arguments: str) -> None:

@@ -1,4 +1,4 @@
-"""What a paired device may not ask for: files of the computer by their names, and machines that nobody there has named."""
+"""Requests forbidden to a paired device: files of the computer by name, and machines not named at the computer itself."""
 
 from pathlib import Path
 from typing import Any
@@ -26,7 +26,7 @@ def test_other_commands_of_a_bench_are_done(asked: dict[str, Any]) -> None:
     ("asked", "error"),
     [
         ({"do": "check", "port": "/etc/passwd"}, PrinterError),
-        ({"do": "check", "port": "octoprint:evil.example"}, PrinterError),  # it would be given the key
+        ({"do": "check", "port": "octoprint:evil.example"}, PrinterError),  # it would receive the key
         ({"do": "hand", "port": "socket://10.0.0.1:23"}, PrinterError),
         ({"do": "follow", "port": "moonraker:other"}, PrinterError),
         ({"do": "go_on", "port": "sim", "journal": "/home/me/x"}, JournalError),

@@ -1,4 +1,4 @@
-"""Pairing of a device: codes from one state to the next, and what paired devices are called."""
+"""Pairing of a device: codes from one state to the next, and the names of paired devices."""
 
 import pytest
 from hypothesis import given
@@ -15,7 +15,7 @@ EDGE = "Mozilla/5.0 (Windows NT 10.0; Win64; x64) AppleWebKit/537.36 (KHTML, lik
 
 
 def after_wrong(count: int) -> tuple[Pairing, list[Verdict]]:
-    """The state after so many wrong codes, each typed when the waiting of the one before was over."""
+    """The state after a number of wrong codes, each typed as soon as the delay after the previous one was over."""
     pairing, verdicts = OPEN, []
     for _ in range(count):
         pairing, verdict = judge(pairing, "no", pairing.waits_until_s, CODE)

@@ -1,4 +1,4 @@
-"""A printer by hand: heated, homed and moved only as is safe, and let go of with its heaters off."""
+"""Manual control of a printer: safe heating, homing and moves only, and heaters off at the end."""
 
 import time
 from collections.abc import Callable, Iterator
@@ -31,7 +31,7 @@ def wait_until(condition: Callable[[], object]) -> None:
 
 
 class Reporter:
-    """A reporter that only remembers."""
+    """A reporter that only records."""
 
     def __init__(self) -> None:
         self.state: dict[str, Any] = {}
@@ -48,7 +48,7 @@ def in_hand() -> Iterator[tuple[AtPage, Reporter]]:
     def serve() -> None:
         try:
             told.tell(end=by_hand(PrintJob(Simulated(), Does.HAND, profile=PROFILE), person))
-        except Exception as error:  # noqa: BLE001 - told as the process does
+        except Exception as error:  # noqa: BLE001 - reported as the process does
             told.tell(end=End(PrintState.FAILED, str(error)))
 
     thread = Thread(target=serve, daemon=True)
@@ -73,7 +73,7 @@ def test_a_printer_is_heated_homed_and_moved_and_its_heaters_go_off_when_it_is_l
         before = told.state["status"].at
         person.hear(HandCommand(HandDoes.JOG, "X", 5.0))
         wait_until(lambda: told.state["status"].at["X"] == pytest.approx(before["X"] + 5.0, abs=0.01))
-        for _ in range(4):  # farther than the axis goes
+        for _ in range(4):  # farther than the axis reaches
             person.hear(HandCommand(HandDoes.JOG, "X", 99.0))
         wait_until(lambda: "are allowed" in told.state["status"].message)
     assert told.state["end"] == End(PrintState.DONE, "disconnected; the heaters are off")
@@ -94,7 +94,7 @@ def test_nothing_is_homed_or_moved_over_a_table_that_is_tilted_or_of_which_nothi
         check_level(MACHINE, {"X": 0.0}, homing=True)
     check_level(load(machine="three_axis").machine, {"X": 0.0}, homing=False)
     switched_on = dict(zip("XYZAC", MACHINE.home, strict=True))
-    check_level(MACHINE, switched_on, homing=True)  # the person is asked
+    check_level(MACHINE, switched_on, homing=True)  # the user is asked
     with pytest.raises(MoveError, match="the table is tilted"):
         check_level(MACHINE, switched_on, homing=False)
 

@@ -1,4 +1,4 @@
-"""What is known of slices is not asked for again: a print of them is refused before a printer is asked, or begins sooner."""
+"""Print jobs of slices whose findings are known: they are refused before a printer is queried, or begin sooner."""
 
 import asyncio
 from pathlib import Path
@@ -45,7 +45,7 @@ def file(lines: list[str]) -> Path:
 
 
 def session(lines: list[str], profile: Profile = PROFILE) -> Any:
-    """A bench whose slices are these lines, dry-run as slicing does it."""
+    """A bench with slices of these lines, dry-run as slicing does it."""
     known = known_findings(lines, profile, dry_run(lines, profile).findings)
     sliced = Sliced(
         Path("page.html"), file(lines), "key", 60.0, 1.0, known, Alternative("in 1 part", "", 1, 60.0, 1.0, 1.0, 0.0, 0.0)
@@ -57,10 +57,10 @@ def session(lines: list[str], profile: Profile = PROFILE) -> Any:
 
 
 class Silent:
-    """Says nothing."""
+    """A reporter without output."""
 
     def tell(self, **values: Any) -> None:
-        """Nobody listens."""
+        """Discard the values."""
 
 
 def refusal(given: Any, port: str, **further: Any) -> UserError:

@@ -1,4 +1,4 @@
-"""Prints of the workbench: that they end safely whoever dies, and are refused as `print` refuses."""
+"""Prints of the workbench: they end safely whichever process dies, and are refused as `print` refuses them."""
 
 import asyncio
 import os
@@ -65,14 +65,14 @@ def rest_of(journal: Path, port: str) -> PrintJob:
 
 @cache
 def written(gcode: str) -> Path:
-    """A file with G-code, which is there as long as the tests run."""
+    """A file with G-code, which exists while the tests run."""
     file = Path(_folder.name) / f"{len(gcode)}.gcode"
     file.write_text(gcode)
     return file
 
 
 def print_until(port: str, runs: Callable[[RunningPrint], object], end: Callable[[Prints, RunningPrint], None]) -> JobState:
-    """The last state of a print that is ended in some way when it runs."""
+    """The last state of a print that is ended in a given way once a condition holds."""
 
     async def run() -> JobState:
         prints = Prints()
@@ -122,7 +122,7 @@ def break_off(prints: Prints, current: RunningPrint) -> None:
 
 
 def cannot_be_told(prints: Prints, current: RunningPrint) -> None:
-    """A fault of the program in the midst of what the process says."""
+    """A bug in the program while it handles a report of the process."""
     tell = current._changed
 
     def fail() -> None:
@@ -133,7 +133,7 @@ def cannot_be_told(prints: Prints, current: RunningPrint) -> None:
 
 
 def freeze(prints: Prints, current: RunningPrint) -> None:
-    """Its process does nothing any more, also not what it is told; then a person presses the emergency stop."""
+    """Stop the print's process, so that it also ignores commands; then the user presses the emergency stop."""
     os.kill(process_of(current).pid, signal.SIGSTOP)
     prints.stop_at_once(None)
 
@@ -220,7 +220,7 @@ def test_an_emergency_stop_while_the_file_is_handed_over_halts_the_printer_and_s
     assert ended.sentence == f"emergency stop: {address} has taken it; restart the printer before the next print"
 
 
-# A print's process that is left and does nothing any more of what it hears.
+# A print's process that is left and ignores everything it receives.
 LEAVES = """
 import sys, time
 from machine.link.print_state import PrintState, PrintStatus
@@ -275,7 +275,7 @@ def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_o
 
 
 class Heard:
-    """Takes what is told."""
+    """Records the values reported."""
 
     def __init__(self) -> None:
         self.state: dict[str, Any] = {}
@@ -298,7 +298,7 @@ def test_what_print_refuses_is_refused_with_its_sentence(wanted: PrintJob, sente
     end, goes_on = carry_out(wanted, AtPage(heard))  # type: ignore[arg-type]
     assert terminal_words(end.sentence).startswith(sentence)
     assert (end.state, goes_on) == ("refused", forcible)
-    assert "state" not in heard.state  # nobody was asked
+    assert "state" not in heard.state  # no server was queried
 
 
 def test_an_incomplete_journal_is_refused_at_the_page_with_the_sentence_of_resume(
@@ -370,7 +370,7 @@ def test_a_file_that_is_only_to_be_kept_is_handed_over_while_its_server_prints_a
 
 
 class Attended:
-    """A print on a server that a person at a page attends, in a thread of its own."""
+    """A print on a server in its own thread, controlled by the user of a page."""
 
     def __init__(self, wanted: PrintJob) -> None:
         self.heard = Heard()
@@ -570,7 +570,7 @@ def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.M
         prints._last = 2
         enter(prints.prints[0], "failed")  # by the first press
         prints.stop_at_once(1)
-        del prints.prints[0]  # another page has taken it off the list
+        del prints.prints[0]  # another page has removed it from the list
         prints.stop_at_once(1)
         assert 2 not in stopped
         prints.stop_at_once(None)
@@ -584,7 +584,7 @@ def test_what_runs_stays_in_the_list_to_be_stopped_and_of_what_is_over_the_newes
     monkeypatch.setattr(RunningPrint, "stop_at_once", lambda current: stopped.append(current.number))
 
     async def runs(current: RunningPrint) -> None:
-        """For good."""
+        """Return at once, without an end of the print."""
 
     async def run() -> None:
         prints = Prints()
