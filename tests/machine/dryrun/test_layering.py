@@ -1,4 +1,4 @@
-"""Layers: beads over sparse infill or support are no finding, but a layer without beads is one, whatever is above it."""
+"""Layers: beads over sparse infill or support are not reported; a layer without beads is, whatever is above it."""
 
 import re
 from functools import cache

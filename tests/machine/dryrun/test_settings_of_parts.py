@@ -1,4 +1,4 @@
-"""A deviation that a part's own settings request is no fault."""
+"""A part's own settings cause no finding."""
 
 from machine.dryrun import dry_run
 from profiles.part_settings import PartSettings

@@ -76,7 +76,7 @@ def marlin_receives(data: bytes) -> Read:
 
 
 def octoprint(line: str) -> Read:
-    """What OctoPrint sends to a Marlin for a line of a file: cut at a `;` that no backslash escapes."""
+    """The bytes that OctoPrint sends to a Marlin for a line of a file: cut at a `;` that no backslash escapes."""
     kept = re.sub(r"\\(.)", r"\1", re.split(r"(?<!\\);", line, maxsplit=1)[0].strip())
     while "\x08" in kept:  # each deletes a character, as process_stream_char does
         kept = re.sub("[^\x08]?\x08", "", kept, count=1)
@@ -102,7 +102,8 @@ def klipper(line: str) -> Read:
 
 
 def reprapfirmware(line: str) -> list[Read]:
-    """StringParser: parentheses are no comments, a G or M outside quotes begins a command, the first of two words counts."""
+    """StringParser: it does not treat parentheses as comments, a G or M outside quotes begins a command, the first of two
+    words counts."""
     kept, quoted = "", False
     for c in line.strip():
         quoted ^= c == '"'
@@ -205,7 +206,7 @@ def assert_same_moves(done: list[tuple[int, list[float]]], program: ParsedProgra
 
 
 def sent(lines: list[str]) -> list[tuple[int, bytes]]:
-    """What is sent down a serial line: the line's number in the program, and the bytes."""
+    """Data sent down a serial line: the line's number in the program, and the bytes."""
     commands = [(number, command_of(line, number)) for number, line in enumerate(lines, 1)]
     return [(number, frame(number, command)) for number, command in commands if command]
 
