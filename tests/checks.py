@@ -1,4 +1,4 @@
-"""Assertions that several tests share."""
+"""Shared assertions."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Models with limbs that are cut off and printed while others stand beside them, for the tests."""
+"""Test models with limbs that are printed beside other standing limbs."""
 
 from collections.abc import Sequence
 from functools import cache
@@ -28,13 +28,13 @@ LEANING = (np.sin(np.radians(45.0)), 0.0, np.cos(np.radians(45.0)))
 
 
 def limb(mesh: Mesh, near_mm: Sequence[Sequence[float]], through_mm: Sequence[float], normal: Sequence[float] = UP) -> Plane:
-    """A plane through a point that takes off the limbs with the vertices nearest to some points."""
+    """A plane through a point that cuts off the limbs containing the vertices nearest to some points."""
     nearest = [mesh.vertices[np.argmin(np.linalg.norm(mesh.vertices - point, axis=1))] for point in np.array(near_mm)]
     return Plane(np.array(normal), float(np.dot(normal, through_mm)), np.array(nearest))
 
 
 def decomposed(mesh: Mesh, profile: Profile, *planes: Plane) -> Decomposition:
-    """A mesh cut by planes, the first one's part printed last."""
+    """A mesh cut by planes; the part of the first plane is printed last."""
     problem = Problem(mesh, profile)
     node = problem.root
     for plane in planes:
@@ -45,7 +45,7 @@ def decomposed(mesh: Mesh, profile: Profile, *planes: Plane) -> Decomposition:
 
 
 def posts(*at_mm: float, height_mm: float = 20.0, bar_mm: float = 0.0) -> Mesh:
-    """Square posts of 8 mm in a row on a plate of 4 mm, each with a bar of that length on its top."""
+    """Square posts, 8 mm wide, in a row on a plate 4 mm thick; with bar_mm, each carries a bar of that length."""
     solid = m3.Manifold.cube((110.0, 30.0, 4.0), True).translate((0.0, 0.0, 2.0))
     for x in at_mm:
         solid += m3.Manifold.cube((8.0, 8.0, height_mm + 2.0), True).translate((x, 0.0, 3.0 + 0.5 * height_mm))
@@ -55,18 +55,19 @@ def posts(*at_mm: float, height_mm: float = 20.0, bar_mm: float = 0.0) -> Mesh:
 
 
 def outer_posts(profile: Profile, base_mm: float = 6.0) -> Decomposition:
-    """Three posts up to 24 mm, the outer two printed together from a height on while the middle one stands."""
+    """Three posts up to 24 mm; above base_mm the outer two are printed together beside the middle one."""
     mesh = posts(-35.0, 0.0, 35.0)
     return decomposed(mesh, profile, limb(mesh, [(-35.0, 0.0, 24.0), (35.0, 0.0, 24.0)], (0.0, 0.0, base_mm)))
 
 
 def between_layers(profile: Profile) -> Decomposition:
-    """The same, cut in the middle of a layer of 0.2 mm."""
+    """The three posts of `outer_posts`, cut in the middle of a 0.2 mm layer."""
     return outer_posts(profile, 6.1)
 
 
 def leaning_arm(profile: Profile) -> Decomposition:
-    """An arm that leans by 45 degrees, printed along it while a tower of 50 mm stands 31 mm above its base plane."""
+    """An arm leaning by 45 degrees, printed along its axis beside a tower of 50 mm that reaches 31 mm above the arm's base
+    plane."""
     solid = m3.Manifold.cube((80.0, 90.0, 4.0), True).translate((0.0, 0.0, 2.0))
     solid += m3.Manifold.cube((14.0, 14.0, 16.0), True).translate((0.0, -25.0, 8.0))
     solid += m3.Manifold.cylinder(40.0, 4.0, 4.0, 32).rotate((0.0, 45.0, 0.0)).translate((0.0, -25.0, 10.0))
@@ -94,7 +95,7 @@ def printed(model: str, stops: Sequence[Stop] = ()) -> tuple[MachineProgram, Dry
 
 
 def moved_part(program: MachineProgram, index: int) -> tuple[Floats, Floats]:
-    """(n, 3) beginnings and ends of the straight moves from a part's first layer to the next part, or a turn of the table."""
+    """(n, 3) starts and ends of a part's straight moves, from its first layer to the next part or table turn."""
     begun = False
     starts, ends = [np.zeros((0, 3))], [np.zeros((0, 3))]
     for move in moves_of(program):

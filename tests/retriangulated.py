@@ -1,4 +1,4 @@
-"""The same shape in other triangles: edges and faces split, diagonals of flat quadrangles flipped, all edges short."""
+"""Other triangulations of a shape: edges and faces split, diagonals of flat quadrilaterals flipped, all edges short."""
 
 import manifold3d as m3
 import numpy as np
@@ -7,19 +7,19 @@ from mdp.mesh import Floats, Mesh
 from tests.shapes import from_manifold
 
 FLAT = 1.0 - 1e-9  # cosine of the normals of two faces in one plane
-LEAST_MM2 = 1e-3  # twice the area of a face that a flip may make
+LEAST_MM2 = 1e-3  # twice the least area of a face made by a flip
 
 Face = tuple[int, int, int]
 
 
 def refined(mesh: Mesh, length_mm: float) -> Mesh:
-    """No edge longer than that."""
+    """A mesh refined until no edge is longer than length_mm."""
     solid = m3.Manifold(m3.Mesh64(mesh.vertices.copy(), mesh.faces.astype(np.uint64)))
     return from_manifold(solid.refine_to_length(length_mm))
 
 
 def edited(mesh: Mesh, seed: int, edits: int) -> Mesh:
-    """So many random edits, each a split face, a split edge or a flipped diagonal; faces in another order."""
+    """A number of random edits, each a split face, a split edge or a flipped diagonal; faces in random order."""
     random = np.random.default_rng(seed)
     vertices, faces = list(mesh.vertices), [(int(a), int(b), int(c)) for a, b, c in mesh.faces]
     for _ in range(edits):
@@ -50,7 +50,7 @@ def _split_edge(vertices: list[Floats], faces: list[Face], f: int, corner: int, 
 
 
 def _flip_edge(vertices: list[Floats], faces: list[Face], f: int, corner: int) -> None:
-    """Flip the edge where the two faces at it are a flat and convex quadrangle."""
+    """Flip the edge if its two faces form a flat and convex quadrilateral."""
     g, (a, b, c, d) = _quadrangle(faces, f, corner)
     normals = [
         np.cross(vertices[q] - vertices[p], vertices[r] - vertices[p]) for p, q, r in ((a, b, c), (b, a, d), (c, a, d), (d, b, c))
@@ -61,7 +61,7 @@ def _flip_edge(vertices: list[Floats], faces: list[Face], f: int, corner: int) -
 
 
 def _quadrangle(faces: list[Face], f: int, corner: int) -> tuple[int, tuple[int, int, int, int]]:
-    """The face beyond an edge; the ends of the edge and the corners beside it in either face."""
+    """The face beyond an edge; the ends of the edge and the opposite corners in both faces."""
     a, b, c = (faces[f][(corner + k) % 3] for k in range(3))
     g = next(g for g, face in enumerate(faces) if (b, a) in zip(face, (*face[1:], face[0]), strict=True))
     return g, (a, b, c, next(v for v in faces[g] if v not in (a, b)))

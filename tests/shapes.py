@@ -1,4 +1,4 @@
-"""Named tiny shapes for the tests."""
+"""Named small shapes for tests."""
 
 import manifold3d as m3
 import numpy as np
@@ -19,7 +19,7 @@ def standing(solid: m3.Manifold) -> Mesh:
 
 
 def box(x: float = 20.0, y: float = 20.0, z: float = 20.0) -> Mesh:
-    """A box standing on the platform."""
+    """A box on the build plate."""
     return standing(m3.Manifold.cube((x, y, z)))
 
 
@@ -55,18 +55,18 @@ def bowl() -> Mesh:
 
 
 def ball(radius: float = 10.0, segments: int = 48) -> Mesh:
-    """A sphere touching the platform in one point."""
+    """A sphere touching the build plate in one point."""
     return standing(m3.Manifold.sphere(radius, segments))
 
 
 def octahedron(radius: float = 5.0) -> Mesh:
-    """A double pyramid standing on its point."""
+    """A double pyramid standing on its tip."""
     points = [(radius, 0, 0), (0, radius, 0), (-radius, 0, 0), (0, -radius, 0), (0, 0, radius), (0, 0, -radius)]
     return standing(m3.Manifold.hull_points(points))
 
 
 def bar_beside_a_tower(gap: float = 12.0) -> Mesh:
-    """A plate with a post that carries a bar, 41 mm long, over it, and a taller tower, so far beside the bar."""
+    """A plate with a post that carries a bar, 41 mm long, over it, and a taller tower at a distance beside the bar."""
     plate = m3.Manifold.cube((80, 80, 4)).translate((-40, -40, 0))
     post = m3.Manifold.cube((12, 12, 60)).translate((-25, -6, 0))
     bar = m3.Manifold.cube((41, 12, 12)).translate((-14, -6, 48))

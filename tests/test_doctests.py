@@ -1,4 +1,4 @@
-"""The examples in the docstrings are true: every module that has any runs them."""
+"""The examples in the docstrings are correct: every module that has any runs them."""
 
 import doctest
 from importlib import import_module

@@ -1,4 +1,5 @@
-"""Layers are a straight line, rooms stand above what they import, third parties stay where they belong: read from all imports."""
+"""Layers form a straight line, rooms are above their imports, and third-party libraries stay in their rooms: read from all
+imports."""
 
 import subprocess
 import sys
@@ -11,7 +12,7 @@ from tools.docs import draw_rooms
 from tools.docs.draw_rooms import LAYERS, PICTURE, draw, floors, import_graph, imports, room_graph, rooms_of
 
 ROOT = Path(__file__).resolve().parents[1]
-# Third party -> the beginnings of the module paths that may import it; nowhere else in the packages.
+# Third-party library -> the prefixes of the module paths that may import it.
 CONFINED = {
     "trimesh": ("mdp/formats/scene", "mdp/mesh", "mdp/save"),
     "cascadio": ("mdp/formats/cad_library",),
@@ -53,7 +54,7 @@ CONFINED = {
     "tests": (),
     "tools": (),
 }
-FRONT_ENDS = ("machine/cli/", "machine/workbench/")  # they talk to people: nothing below knows them
+FRONT_ENDS = ("machine/cli/", "machine/workbench/")  # they talk to users; no lower module imports them
 HEAVY = {
     "numba",
     "rich",
@@ -80,7 +81,7 @@ HEAVY = {
 
 
 def offences(path: str, source: str) -> list[str]:
-    """What a module at a path relative to the root imports although it must not, a sentence for every package."""
+    """Forbidden imports of a module at a path relative to the root, as one sentence for each package."""
     layer = path.split("/")[0]
     wrong: dict[tuple[str, str], str] = {}
     for module in imports(source):
@@ -160,7 +161,7 @@ def test_two_rooms_that_import_each_other_are_found() -> None:
 
 def test_no_file_imports_itself_by_way_of_others_not_even_for_types() -> None:
     sources = {module: source for module, source in draw_rooms.modules().items() if not module.endswith("__init__")}
-    floors(import_graph(sources))  # raises CycleError with the files of a circle
+    floors(import_graph(sources))  # raises CycleError with the files of a cycle
 
 
 def test_a_circle_behind_type_checking_is_found() -> None:

@@ -1,4 +1,4 @@
-"""The examples of README and docs run: every command of a page, one after the other in one folder, on small prints."""
+"""The examples of README and docs run: all commands of a page, in order, in one folder, on small prints."""
 
 import re
 import shlex
@@ -14,7 +14,7 @@ from tests.shapes import tee
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-# Only parsed: what needs a user, a device, a server or a browser, and the piece whose plan does not fit it in another size.
+# Only parsed: commands that need a user, a device, a server or a browser, and the piece whose plan fits no other size.
 ONLY_PARSED = (
     "tiltprint edit",
     "tiltprint simulator",
@@ -38,7 +38,7 @@ PARSED_WITH = (
     "piece.gcode",
     "--plate",
 )
-# A process of its own name in the user's folder makes every print small and quick.
+# A process profile in the user's folder makes every print small and quick.
 QUICK = """inherits = "standard"
 
 [process]
@@ -65,7 +65,7 @@ def commands(page: Path) -> list[str]:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A working folder with the files that the pages take for granted."""
+    """A working folder with the files that the pages assume."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "config"))
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
@@ -83,7 +83,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def parsed(words: list[str]) -> bool:
-    """Whether the command line takes these words, without running their command."""
+    """Whether the command line accepts these words, without running their command."""
     group = typer.main.get_command(app)
     with group.make_context("tiltprint", [words[0], "--help"], resilient_parsing=True) as context:
         name, command, rest = group.resolve_command(context, words)

@@ -1,4 +1,4 @@
-"""The pages name only what exists: every dotted name of a package is a module, function, class, field or a machine's key."""
+"""The pages name only existing objects: every dotted name of a package is a module, function, class, field or a machine's key."""
 
 import ast
 import re
@@ -23,7 +23,7 @@ def named(page: str) -> list[str]:
 
 
 def is_key(name: str) -> bool:
-    """True for what a machine's profile may say: `machine.turn.zero_deg` is no module."""
+    """Whether a name is a key of a machine's profile: `machine.turn.zero_deg` is not a module."""
     section, *steps = name.split(".")[1:]
     return name == "machine.sources" or _is_field(Machine, [section, *steps])
 
@@ -34,7 +34,8 @@ def _is_field(model: Any, steps: list[str]) -> bool:
 
 
 def exists(name: str) -> bool:
-    """True for a package, a module, and what a module defines, down to the fields and methods of its classes."""
+    """Whether a name is a package, a module, or an object that a module defines, down to the fields and methods of its
+    classes."""
     steps = name.split(".")
     for count in range(len(steps), 0, -1):
         path = ROOT.joinpath(*steps[:count])
@@ -76,7 +77,7 @@ def test_what_a_page_names_exists(page: str) -> None:
 
 
 def anchors(page: Path) -> set[str]:
-    """The anchors of a page's headings, as GitHub makes them."""
+    """The anchors of a page's headings, as GitHub generates them."""
     headings = re.findall(r"^#+ (.*)$", page.read_text(encoding="utf-8"), re.MULTILINE)
     return {re.sub(r"[^\w\- ]", "", heading.strip().lower()).replace(" ", "-") for heading in headings}
 

@@ -1,4 +1,4 @@
-"""Docstrings and comments use the words of CONTRIBUTING.md's glossary: those in WORDS stand for others, or are not understood."""
+"""Docstrings and comments use the words of CONTRIBUTING.md's glossary, and not those in WORDS."""
 
 import ast
 import io
@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = ("mdp", "slicer", "profiles", "machine", "tools")
-# Words and constructions that are not used -> what to write instead. Matched in each paragraph, in either case without (?-i:).
+# Words and constructions to avoid -> what to write instead. Matched in each paragraph, ignoring case except in (?-i:).
 WORDS = {
     r"\btold\b|\btells?\b(?!: )": "given, reported, distinguishes",
     r"\basked for\b": "requested, required",
@@ -78,7 +78,7 @@ def words_of(source: str) -> Iterator[tuple[int, str]]:
 
 
 def findings(source: str) -> list[str]:
-    """A line for every word of a file that is not used, with what to write instead."""
+    """A line for every banned word of a file, with what to write instead."""
     return [
         f"{number}: {match[0]!r}: write {instead}"
         for number, text in words_of(source)

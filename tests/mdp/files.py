@@ -1,4 +1,4 @@
-"""Small model files written by hand, so that the readers are not tested with themselves."""
+"""Small hand-written model files, so that the readers are not tested with our own writers."""
 
 import json
 import struct
@@ -132,7 +132,7 @@ def threemf_mesh(mesh: Mesh) -> str:
 
 
 def threemf_model(objects: dict[int, str], items: str = "", unit: str = "millimeter") -> str:
-    """A model part: the content of each object by its number, and the build's items as they stand in the file."""
+    """A model part: the content of each object by its number, and the build's items as they are in the file."""
     resources = "".join(f'<object id="{number}" type="model">{content}</object>' for number, content in objects.items())
     core = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02"
     production = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06"
@@ -143,7 +143,7 @@ def threemf_model(objects: dict[int, str], items: str = "", unit: str = "millime
 def threemf(
     path: Path, objects: dict[int, str], items: str, unit: str = "millimeter", parts: dict[str, str] | None = None
 ) -> Path:
-    """A 3MF package of a model part and others by their names."""
+    """A 3MF package of a model part and other parts by their names."""
     relation = '<Relationship Target="/3D/a.model" Id="r" Type="http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel"/>'
     relations = f'<Relationships xmlns="http://schemas.openxmlformats.org/package/2006/relationships">{relation}</Relationships>'
     with zipfile.ZipFile(path, "w") as archive:
@@ -167,7 +167,7 @@ def save(path: Path, content: bytes) -> Path:
 
 
 def refusal(path: Path, **arguments: float) -> str:
-    """The sentence that reading the file ends in; it names the file."""
+    """The error message of reading the file, which must name it."""
     with pytest.raises(MeshError) as caught:
         read_mesh(path, **arguments)
     sentence = str(caught.value)

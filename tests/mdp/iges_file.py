@@ -1,15 +1,15 @@
-"""IGES files written by hand: fixed lines of 80 columns, as IGES 5.3 has them, in the unit that is asked for."""
+"""Hand-written IGES files: fixed lines of 80 columns by IGES 5.3, in a given unit."""
 
 from collections.abc import Sequence
 from math import cos, sin
 
-Entity = tuple[int, int, Sequence[float]]  # its type, its form, its parameters
+Entity = tuple[int, int, Sequence[float]]  # type, form, parameters
 UNITS = {"IN": 1, "MM": 2}
 PARAMETERS, LINE = 64, 72  # columns of text
 
 
 def iges_file(entities: Sequence[Entity], unit: str = "MM") -> str:
-    """A file of entities. They name each other by `pointer`."""
+    """A file of entities, which refer to each other by `pointer`."""
     words = [_text(word) for word in ("part", "part.igs", "tests", "tests")]
     settings = [",".join([*words, "32,38,6,308,15", _text("part"), f"1.0,{UNITS[unit]}", _text(unit)])]
     settings += ["1,0.01", _text("20260101.000000"), "1E-6,1000.0", _text("nobody"), _text("nowhere"), "11,0"]
@@ -28,13 +28,13 @@ def iges_file(entities: Sequence[Entity], unit: str = "MM") -> str:
 
 
 def pointer(number: int) -> int:
-    """What names an entity, counted from 0: the first of its two lines."""
+    """The reference to an entity, counted from 0: the number of the first of its two lines."""
     return 2 * number + 1
 
 
 def iges_cylinder(radius: float, height: float, unit: str = "MM", points: int = 0) -> str:
-    """A group of three faces that share no edge: a cylinder's side, and two planes trimmed by circles that begin elsewhere; and
-    points beside it."""
+    """A group of three faces that share no edge (a cylinder's side, and two planes trimmed by circles that begin elsewhere)
+    and extra points."""
     x, y = radius * cos(1.3), radius * sin(1.3)
     entities: list[Entity] = [(100, 0, [0.0, 0.0, 0.0, radius, 0.0, radius, 0.0]), (122, 0, [pointer(0), radius, 0.0, height])]
     for z in (0.0, height):
@@ -56,7 +56,7 @@ def _text(word: str) -> str:
 
 
 def _wrapped(words: list[str]) -> list[str]:
-    """Parameters with their separators, no line longer than it may be."""
+    """Parameters with their separators, wrapped to the longest line allowed."""
     lines = [""]
     for word in [*(f"{word}," for word in words[:-1]), f"{words[-1]};"]:
         if len(lines[-1]) + len(word) > PARAMETERS:

@@ -1,4 +1,4 @@
-"""Slicer files as PrusaSlicer, Bambu Studio and OrcaSlicer write them, made of solids whose union is known."""
+"""Slicer files as PrusaSlicer, Bambu Studio and OrcaSlicer write them, made of solids with a known union."""
 
 import zipfile
 from collections.abc import Mapping, Sequence
@@ -41,7 +41,7 @@ CONFIG = "Metadata/Slic3r_PE_model.config"
 
 @dataclass(frozen=True)
 class Made:
-    """A volume of an object: its solid in the object's frame, what it is, and its settings."""
+    """A volume of an object: its solid in the object's frame, its type and its settings."""
 
     solid: m3.Manifold
     kind: str = "part"
@@ -50,7 +50,7 @@ class Made:
 
 @dataclass(frozen=True)
 class Placed:
-    """Where an object stands, (4, 3), on which plate, and whether it is printed."""
+    """An instance of an object: its transform (4, 3), its plate, and whether it is printed."""
 
     transform: Floats
     plate: int = 1
@@ -59,7 +59,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Object:
-    """An object of a slicer file, its instances and the settings of all of it."""
+    """An object of a slicer file, its instances and its settings."""
 
     volumes: Sequence[Made]
     instances: Sequence[Placed]
@@ -70,7 +70,7 @@ AT_ORIGIN = Placed(np.vstack([np.eye(3), [0.0, 0.0, 10.0]]))
 
 
 def printed(objects: Sequence[Object], plate: int = 1) -> m3.Manifold:
-    """What a plate of the objects prints, in the frame of the file."""
+    """The solid printed on a plate, in the frame of the file."""
     solids = []
     for own in objects:
         parts = m3.Manifold.batch_boolean([made.solid for made in own.volumes if made.kind == "part"], m3.OpType.Add)
@@ -105,7 +105,7 @@ def prusaslicer(path: Path, objects: Sequence[Object], further: Mapping[str, str
 
 
 def bambu(path: Path, objects: Sequence[Object], rng: np.random.Generator, further: Mapping[str, str] | None = None) -> Path:
-    """Each volume in a part of its own, with a transform of its own, as a component of its object."""
+    """Each volume in a part of its own with its own transform, as a component of its object."""
     written, items, config, parts, plates = dict[int, str](), [], [], dict[str, str](), dict[int, list[str]]()
     number = 1
     for place, own in enumerate(objects):
@@ -148,7 +148,7 @@ def check(mesh: Mesh, expected: m3.Manifold) -> None:
 
 
 def change(path: Path, part: str, old: str, new: str) -> None:
-    """Write a part of a package otherwise."""
+    """Replace a part of a package."""
     with zipfile.ZipFile(path) as archive:
         texts = {name: archive.read(name).decode() for name in archive.namelist()}
     assert old in texts[part]
@@ -170,7 +170,7 @@ def paint(path: Path, rows: Sequence[int], attributes: str) -> None:
 
 
 def affine(rng: np.random.Generator) -> Floats:
-    """(4, 3) a rotation, scales of 0.5 to 2 along its axes, maybe mirrored, and a shift."""
+    """(4, 3) a rotation, scales of 0.5 to 2 along its axes, maybe a mirroring, and a shift."""
     turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
     scales = rng.uniform(0.5, 2.0, 3) * rng.choice([-1.0, 1.0], 3)
     return np.vstack([np.diag(scales) @ turn, rng.uniform(-20.0, 20.0, 3)])

@@ -1,4 +1,4 @@
-"""Random solids for property tests, and what lies above a plane worked out face by face."""
+"""Random solids for property tests, and the solid above a plane computed face by face."""
 
 from itertools import pairwise
 
@@ -11,7 +11,7 @@ from mdp.plane import Plane
 
 
 def random_solid(seed: int) -> Mesh:
-    """Overlapping random boxes and balls on a base plate, drilled and hollowed: bowls, handles and closed voids appear."""
+    """Random overlapping boxes and balls on a base plate, drilled and hollowed: bowls, handles and closed voids appear."""
     rng = np.random.default_rng(seed)
     solid = m3.Manifold.cube((30, 30, 3), True).translate((0, 0, 1.5))
     for k in range(6):
@@ -31,13 +31,13 @@ def random_solid(seed: int) -> Mesh:
 
 
 def random_direction(height: int, around: int) -> Floats:
-    """A unit direction from two numbers of 1 to 999: the thousandths of its z and of a turn."""
+    """A unit direction from two integers of 1 to 999: its z and its azimuth in thousandths."""
     z, angle = height / 1000.0, around / 1000.0 * 2.0 * np.pi
     return np.array([np.sqrt(1 - z * z) * np.cos(angle), np.sqrt(1 - z * z) * np.sin(angle), z])
 
 
 def area_vectors_above(mesh: Mesh, plane: Plane) -> Floats:
-    """(m, 3) area times normal of every face's part above the plane, each face clipped corner by corner."""
+    """(m, 3) area times normal of the part of each face above the plane, each face clipped corner by corner."""
     vectors = np.zeros((len(mesh.faces), 3))
     for f, corners in enumerate(mesh.vertices[mesh.faces]):
         heights = plane.heights_mm(corners)

@@ -1,4 +1,4 @@
-"""Prisms and cylinders as STEP files (ISO 10303-21, AP214): boundary representations, written by hand."""
+"""Hand-written STEP files (ISO 10303-21, AP214) of prisms and cylinders as boundary representations."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
@@ -14,7 +14,7 @@ Corner = tuple[float, float]
 
 
 class Entities(list[str]):
-    """The instances of a file: each gets the next number, by which others name it."""
+    """The instances of a file: each gets the next number, by which others refer to it."""
 
     def add(self, name: str, *values: object) -> str:
         self.append(f"#{len(self) + 1}={name}({','.join(map(str, values))});")
@@ -37,7 +37,7 @@ def step_box(sides: tuple[float, float, float], prefix: str = ".MILLI.") -> str:
 
 
 def step_assembly(*boxes: tuple[str, tuple[float, float, float]]) -> str:
-    """The file of named boxes with a corner at the origin, which no product holds together."""
+    """The file of named boxes with a corner at the origin, without a common product."""
     rows: list[str] = []
     for name, sides in boxes:
         shift = len(rows)
@@ -47,7 +47,7 @@ def step_assembly(*boxes: tuple[str, tuple[float, float, float]]) -> str:
 
 
 def painted(file: str, colours: Mapping[int, tuple[float, float, float]]) -> str:
-    """The file with a colour (red, green, blue, 0 to 1) for faces by their place in it, -1: for the solid."""
+    """The file with a colour (red, green, blue, 0 to 1) for faces by their index in it; -1: for the solid."""
     ids = [re.findall(rf"#(\d+)={name}", file) for name in ("ADVANCED_FACE", "MANIFOLD_SOLID_BREP", r"\(?GEOMETRIC_REP")]
     entities = Entities([""] * max(map(int, re.findall(r"#(\d+)=", file))))
     first, items = len(entities), []
@@ -63,7 +63,7 @@ def painted(file: str, colours: Mapping[int, tuple[float, float, float]]) -> str
 
 
 def step_prism(base: Sequence[Corner], height: float, top: float = 1.0, prefix: str = ".MILLI.") -> str:
-    """The file of a prism over a polygon that runs counter-clockwise; top: factor on the upper polygon, a frustum then."""
+    """The file of a prism over a counter-clockwise polygon; top: factor on the upper polygon, which gives a frustum."""
     count = len(base)
     points = [(x, y, 0.0) for x, y in base] + [(top * x, top * y, height) for x, y in base]
     sides = [(k, (k + 1) % count, count + (k + 1) % count, count + k) for k in range(count)]
@@ -104,7 +104,7 @@ def _file(entities: Entities, faces: Iterable[str], prefix: str) -> str:
 
 
 class _Faceted:
-    """A solid of plane faces; each edge is one that two faces share."""
+    """A solid of plane faces, each edge shared by two faces."""
 
     def __init__(self, points: Sequence[Sequence[float]]) -> None:
         self.entities, self.points = Entities(), points
@@ -117,12 +117,12 @@ class _Faceted:
         edges = [add("ORIENTED_EDGE", "''", "*", "*", *self._edge(*ends)) for ends in pairwise([*loop, loop[0]])]
         bound = add("FACE_OUTER_BOUND", "''", add("EDGE_LOOP", "''", _list(edges)), ".T.")
         corners = np.array([self.points[corner] for corner in loop])
-        normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)  # Newell
+        normal = np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)  # Newell's method
         frame = self.entities.frame(corners[0], normal, corners[1] - corners[0])
         return add("ADVANCED_FACE", "''", _list([bound]), add("PLANE", "''", frame), ".T.")
 
     def _edge(self, start: int, end: int) -> tuple[str, str]:
-        """The edge between two corners, and whether it runs that way."""
+        """The edge between two corners, and whether it runs in that direction."""
         if (start, end) not in self.edges:
             add, way = self.entities.add, [b - a for a, b in zip(self.points[start], self.points[end], strict=True)]
             vector = add("VECTOR", "''", self.entities.direction(way), "1.")

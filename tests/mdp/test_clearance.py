@@ -1,4 +1,4 @@
-"""What of a cradle stands higher than the table keeps poses out: checked with solids that manifold3d cuts with one another."""
+"""Poses blocked by parts of a cradle above the table: checked by intersecting solids in manifold3d."""
 
 import manifold3d as m3
 import numpy as np
@@ -31,7 +31,7 @@ def with_clip(y_mm: float, height_mm: float) -> Machine:
 
 
 def outline(body: Body) -> Floats:
-    """Corners of a body of the head; of a ring those of 24-gons inside its discs, and 300 mm above them."""
+    """Corners of a body of the head; for a ring, those of 24-gons inside its discs and of copies 300 mm higher."""
     if isinstance(body, Block):
         return corners(body.min_mm, body.max_mm)
     turns = np.arange(24) * np.pi / 12
@@ -40,7 +40,7 @@ def outline(body: Body) -> Floats:
 
 
 def meet(machine: Machine, pose: Pose) -> bool:
-    """Whether a body of the head, over all places of the tip, shares room with the post or clip; by exact solids."""
+    """Whether a body of the head, swept over all tip positions, intersects the post or clip; by exact solids."""
     tips = PART @ rotation(machine, pose).T + shift(machine, pose)
     tilted = Pose(pose.tilt_deg, machine.turn.zero_deg) if machine.cradle else pose
     (box,) = machine.cradle or machine.table.clips

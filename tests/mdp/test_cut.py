@@ -1,4 +1,4 @@
-"""Cut: both halves of a solid, each made alone."""
+"""Cut: both halves of a solid, each computed alone."""
 
 import numpy as np
 import pytest

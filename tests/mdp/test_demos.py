@@ -1,4 +1,4 @@
-"""The demo models: closed, printable, worth several directions or cut by a plan of their own, and remade byte for byte."""
+"""The demo models: closed, printable, better in several directions or cut by their own plan, and reproduced byte for byte."""
 
 from importlib import resources
 from pathlib import Path

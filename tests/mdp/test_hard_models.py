@@ -1,4 +1,4 @@
-"""Models that searches stumble over: lattices, points to stand on, pieces in the air, nothing to do and nothing to be done."""
+"""Models that are hard to search: lattices, points to stand on, floating pieces, nothing to improve and nothing possible."""
 
 import manifold3d as m3
 import numpy as np
@@ -19,7 +19,7 @@ def _decomposed(mesh: Mesh, *settings: str) -> Decomposition:
 
 
 def _lattice(cells: int) -> m3.Manifold:
-    """Rods along the edges of cells cubed cubes of 5 mm."""
+    """Rods along the edges of cells**3 cubes of 5 mm."""
     places = [(5.0 * i, 5.0 * j) for i in range(cells + 1) for j in range(cells + 1)]
     layer = m3.Manifold.batch_boolean([_rod(cells).translate((x, y, 0)) for x, y in places], m3.OpType.Add)
     across = layer.rotate((0, 90, 0)).translate((0, 0, 5.0 * cells))

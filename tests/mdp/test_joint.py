@@ -1,4 +1,4 @@
-"""Joints: newtons at the end of what stands on them, against beams from a textbook and sums over small squares."""
+"""Joints: breaking forces at the far end of the body on them, against textbook beams and sums over small squares."""
 
 from collections.abc import Sequence
 
@@ -16,7 +16,7 @@ from mdp.mesh import Floats
 from tests.slicer.hand import cut, profile
 
 UP = (0.0, 0.0, 1.0)
-STRENGTH_MPA = 12.0  # 20 MPa across layers, 0.6 of it where the plastic below is cold
+STRENGTH_MPA = 12.0  # 20 MPa across layers, times 0.6 where the plastic below is cold
 PROFILE = profile("material.interlayer_strength_mpa=20", "material.cold_weld_factor=0.6")
 
 
@@ -85,7 +85,7 @@ def test_a_tower_in_three_parts_hangs_on_its_lowest_joint() -> None:
 
 
 def test_what_stands_on_two_legs_hangs_on_neither_and_only_where_it_stands_counts() -> None:
-    """The roof stands on both legs: each alone holds only itself."""
+    """The roof stands on both legs, so each leg alone holds only itself."""
     legs = m3.Manifold.cube((4.0, 4.0, 24.0)) + m3.Manifold.cube((4.0, 4.0, 24.0)).translate((30.0, 0.0, 0.0))
     table = legs + m3.Manifold.cube((34.0, 4.0, 10.0)).translate((0.0, 0.0, 24.0)) + m3.Manifold.cube((34.0, 4.0, 2.0))
     leg, roof = joints(table, (UP, 24.0), (UP, 10.0))
@@ -137,7 +137,7 @@ def test_the_papers_terms_know_no_unsound_parts() -> None:
 
 def test_the_first_part_is_a_share_of_what_a_person_has_left_of_the_model() -> None:
     mesh = mesh_of(m3.Manifold.cube((10.0, 10.0, 100.0)))
-    parts = cut(mesh, (UP, 20.0), (UP, 5.0))  # 5 of 20 mm, of 100 mm in all
+    parts = cut(mesh, (UP, 20.0), (UP, 5.0))  # 5 of 20 mm, and of 100 mm in all
     assert [not flaw_of(mesh, parts, PROFILE, by_hand) for by_hand in (0, 1)] == [False, True]
 
 

@@ -19,16 +19,16 @@ def _box(x: float, width: float, height: float) -> Floats:
 
 
 def _clear(gap: float, height: float) -> bool:
-    """Whether a limb of 10 mm can be printed so far beside a tower of that height."""
+    """Whether a limb of 10 mm can be printed with this gap to a tower of that height."""
     return passes_clear(MACHINE, level(MACHINE), (_box(0.0, 10.0, 10.0), _box(10.0 + gap, 8.0, height)), 0.0)
 
 
 @pytest.mark.parametrize(
     ("gap", "height", "clear"),
     [
-        (6.0, 1.7, True),  # 5 mm aside of the tip, 1 mm kept, the hot end is 3 mm up: 2 mm may stand
+        (6.0, 1.7, True),  # 5 mm beside the tip, less 1 mm clearance, the hot end is 3 mm up: 2 mm may remain
         (6.0, 2.3, False),
-        (12.5, 3.2, True),  # 11.5 mm aside it is 4.5 mm up
+        (12.5, 3.2, True),  # 11.5 mm to the side it is 4.5 mm up
         (12.5, 3.8, False),
         (17.0, 38.0, True),  # beyond 16 mm there is only the carriage, 40 mm up
         (17.0, 40.0, False),
@@ -48,7 +48,7 @@ def test_a_limb_whose_every_layer_lies_higher_than_what_stands_is_clear_however_
 
 
 def _wide_box(x: float, height: float) -> Floats:
-    """A box of 70 x 80 mm that begins at x, of many cells in the coarsest grid."""
+    """A box of 70 x 80 mm that begins at x, many cells wide in the coarsest grid."""
     mesh = shapes.box(70.0, 80.0, height)
     return mesh.vertices[mesh.faces] + np.array([x + 35.0, 0.0, 0.0])
 

@@ -1,4 +1,4 @@
-"""The door between our meshes and trimesh's."""
+"""Conversion between our meshes and trimesh's."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Planes whose normals come with any length, from files, pages and moves that add up roundings."""
+"""Planes whose normals have any length: from files, from pages and from moves that accumulate rounding."""
 
 from math import inf, isfinite, nan, nextafter
 

@@ -1,4 +1,4 @@
-"""The sequence of poses against every combination of branches and turns there is."""
+"""The sequence of poses against every combination of branches and turns."""
 
 from itertools import pairwise
 
@@ -17,7 +17,7 @@ LEANING = st.lists(st.tuples(st.floats(1, 80), st.floats(-180, 180)), min_size=1
 
 
 def wound(limits_deg: tuple[float, float] = (-36000.0, 36000.0), budget_deg: float | None = None) -> Machine:
-    """The generic machine with these limits of its turn."""
+    """The generic machine with these limits of its turn axis."""
     turn = GENERIC.turn.model_copy(update={"limits_deg": limits_deg, "budget_deg": budget_deg})
     return GENERIC.model_copy(update={"turn": turn})
 
@@ -32,7 +32,7 @@ def total(chosen: list[Pose]) -> float:
 
 
 def least_of_all(options: list[list[Pose]], most_deg: float) -> float:
-    """The least rotation over every path: all branches, all whole turns inside +-most_deg."""
+    """The least rotation over every path: all branches, all whole turns inside ±most_deg."""
     costs, at = np.zeros(1), np.array([[options[0][0].tilt_deg, options[0][0].turn_deg]])
     for choices in options[1:]:
         turned = [(p.tilt_deg, p.turn_deg + 360.0 * k) for p in choices for k in range(-3, 4)]

@@ -1,4 +1,4 @@
-"""Reading model files: units, scale, rotation, and what is reported about them."""
+"""Reading model files: units, scale, rotation, and the notes about them."""
 
 from pathlib import Path
 

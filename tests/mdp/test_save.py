@@ -1,4 +1,4 @@
-"""What is saved, read back by another library."""
+"""Saved files, read back by another library."""
 
 import io
 

@@ -1,4 +1,4 @@
-"""Zones: which faces reach into a box, and between which offsets a plane passes through it or through faces of a colour."""
+"""Zones: faces that reach into a box, and the offsets at which a plane passes through it or through faces of a colour."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Which settings leave a front as it was found: those that a search, and what prices its rows, never read."""
+"""Settings that leave a front valid: those that neither a search nor the pricing of its rows reads."""
 
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -24,7 +24,7 @@ VARIANTS = [
 
 @contextmanager
 def reading(profile: Profile) -> Iterator[set[str]]:
-    """The keys of a profile, with section and dots, that are read meanwhile; those of axes count for all axes of the kind."""
+    """The keys of a profile (section.key) that are read meanwhile; a key of an axis counts for all axes of its kind."""
     owners = {type(model): name for name, model in _models("", profile)}
     keys = {
         kind: [key for key in kind.model_fields if not isinstance(_sample(profile, owners[kind], key), Frozen)] for kind in owners
@@ -63,7 +63,7 @@ def _sample(profile: Profile, owner: str, key: str) -> object:
 
 
 def effect_of(key: str) -> Effect:
-    """The effect that a key declares, or the usual one of its section."""
+    """The declared effect of a key, or the default of its section."""
     section = key.partition(".")[0]
     declared = dict(keys(SECTIONS[section], f"{section}."))[key].json_schema_extra
     return Effect(declared["effect"]) if isinstance(declared, dict) and "effect" in declared else USUAL[section]

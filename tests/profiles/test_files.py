@@ -1,4 +1,4 @@
-"""Files: never seen half written, whoever else writes, and locked for one at a time on every system."""
+"""Files: never visible half written, with any concurrent writers, and locked exclusively on every system."""
 
 import errno
 import os
@@ -46,7 +46,7 @@ def test_two_that_write_the_same_file_at_the_same_time_do_not_mix(tmp_path: Path
 
 
 class Msvcrt:
-    """Windows' module: a byte of a file is locked by one descriptor."""
+    """Windows' module msvcrt: one descriptor can lock a byte of a file."""
 
     LK_NBLCK = 2
 

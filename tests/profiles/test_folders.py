@@ -1,4 +1,4 @@
-"""Where settings, compiled kernels, logs and journals are, for users with and without a home."""
+"""Folders of settings, compiled kernels, logs and journals, for users with and without a home."""
 
 import os
 import shutil
@@ -15,14 +15,14 @@ from profiles.folders import cache_folder, settings_folder, state_folder
 
 @pytest.fixture(autouse=True)
 def temporary(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A folder for temporary files that is empty."""
+    """An empty folder for temporary files."""
     folder = tmp_path_factory.mktemp("temporary")
     monkeypatch.setattr(tempfile, "tempdir", str(folder))
     return folder / f"tiltprint-{os.geteuid()}"
 
 
 def forget_home(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A user of a container without a name: no HOME, no line in the list of users."""
+    """A container's user without a name: no HOME and no passwd entry."""
     for variable in ("HOME", "XDG_STATE_HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME"):
         monkeypatch.delenv(variable, raising=False)
     monkeypatch.setattr("os.path.expanduser", lambda path: path)

@@ -1,4 +1,4 @@
-"""Labels: every key has one, by which a person knows it among its neighbours and finds it with the words of other slicers."""
+"""Labels: every key has one, which distinguishes it from its neighbours and is found by the words of other slicers."""
 
 from collections import Counter
 

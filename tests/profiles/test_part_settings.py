@@ -1,4 +1,4 @@
-"""Part settings: one part's own values of the process, refused in the sentences of all profiles."""
+"""Part settings: a part's own values of the process, refused with the messages of profiles."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""The user's own folder: found, listed, inherited from, and in the place of shipped profiles of the same name."""
+"""The user's profile folder: found, listed, inherited from, and preferred to shipped profiles of equal name."""
 
 import os
 from pathlib import Path

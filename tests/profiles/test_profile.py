@@ -1,4 +1,4 @@
-"""Profiles: what ships is valid, and every wrong one gets a sentence with key, value and what is allowed."""
+"""Profiles: the shipped ones are valid, and every error gets a message with key, value and allowed range."""
 
 import re
 import tomllib
@@ -246,7 +246,7 @@ def test_adaptive_layers_are_not_thicker_than_the_nozzle_is_wide() -> None:
 
 
 def test_nothing_is_told_of_a_value_that_nobody_gave() -> None:
-    """0.3 mm grooves are too deep for layers of 0.2 mm, which is what the layers would be if the wrong height were left out."""
+    """0.3 mm grooves are too deep for layers of 0.2 mm, the default that would apply if the wrong height were dropped."""
     assert refusal("process.layer_height_mm=99", "process.interlock_mm=0.3") == (
         "process.layer_height_mm is 99: it must be a number from 0.02 to 2"
     )

@@ -27,7 +27,7 @@ def test_the_tables_of_the_page_are_those_of_the_models() -> None:
 
 
 def axes_of(row: str) -> list[str]:
-    """The axes that share a row: x, y and z of `machine.x\\|y\\|z.limits_mm`; a word of no meaning for a row of one key."""
+    """The axes that share a row: x, y and z of `machine.x\\|y\\|z.limits_mm`; a placeholder for a row of one key."""
     return found[0].split("\\|") if (found := re.search(r"(\w+\\\|)+\w+", row)) else ["alone"]
 
 

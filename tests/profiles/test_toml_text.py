@@ -1,4 +1,4 @@
-"""Whatever is wrong with a text, its reason is one short line."""
+"""The error message of an invalid text is one short line."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Parts made by hand, and what the tests of the slicer ask of sliced parts."""
+"""Parts made by hand, and helpers of the tests of the slicer."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -34,13 +34,13 @@ def profile(*settings: str) -> Profile:
 
 
 def whole(mesh: Mesh) -> Part:
-    """A mesh as the only part, standing on the platform."""
+    """A mesh as the only part, on the build plate."""
     machine = profile().machine
     return Part(1, mesh, PLATFORM, level(machine), rotation(machine, level(machine)), mesh.volume_mm3, 0.0)
 
 
 def cut(mesh: Mesh, *planes: tuple[Sequence[float], float]) -> list[Part]:
-    """The parts of a mesh cut by planes (normal, offset), the part above the first plane printed last."""
+    """The parts of a mesh cut by planes (normal, offset); the part above the first plane is printed last."""
     machine = profile().machine
     rest = m3.Manifold(m3.Mesh64(mesh.vertices.copy(), mesh.faces.astype(np.uint64)))
     above = []
@@ -55,7 +55,7 @@ def cut(mesh: Mesh, *planes: tuple[Sequence[float], float]) -> list[Part]:
 
 
 def sections_at(mesh: Mesh, cuts_mm: Floats, *settings: str) -> Sections:
-    """A mesh on the platform cut at heights, with layers of 0.2 mm around them."""
+    """The sections of a mesh on the build plate at some heights, with layers of 0.2 mm around them."""
     outlines = [clean(loops, 0.0) for loops in cross_sections(mesh, cuts_mm)]
     heights = Heights(cuts_mm + 0.1, np.full(len(cuts_mm), 0.2), cuts_mm)
     plate, empty, own = Polygons.square((400.0, 400.0), True), [Polygons()] * len(outlines), profile(*settings)
@@ -105,7 +105,7 @@ def content(sliced: SlicedPart) -> bytes:
 
 
 def shared(name: str, height_mm: float) -> Mesh:
-    """A real model from outside the project, scaled to a height; skips the test where it is not there."""
+    """A real model from outside the project, scaled to a height; skips the test if the file is missing."""
     file = Path(__file__).resolve().parents[3] / "shared" / "meshes" / f"{name}.npz"
     if not file.exists():
         pytest.skip(f"{name} is not here")
@@ -115,7 +115,7 @@ def shared(name: str, height_mm: float) -> Mesh:
 
 
 def as_shapely(polygons: Polygons) -> shapely.Geometry:
-    """The same polygons as shapely's, holes by the even-odd rule."""
+    """Polygons converted to shapely's, holes by the even-odd rule."""
     rings = shapely.MultiLineString([np.vstack([loop, loop[:1]]) for loop in polygons.to_polygons()])
     return shapely.build_area(shapely.node(rings))
 

@@ -1,4 +1,4 @@
-"""Adaptive layers: the steps they leave on cones, spheres and real models, and where they end."""
+"""Adaptive layers: their cusps on cones, spheres and real models, and their upper ends."""
 
 import manifold3d as m3
 import numpy as np
@@ -23,7 +23,7 @@ def adaptive(cusp: float = CUSP, least: float = LEAST, most: float = MOST) -> Pr
 
 
 def cone(slope_deg: float) -> Mesh:
-    """A cone whose side rises by that angle from the level."""
+    """A cone whose side rises by an angle from the horizontal."""
     return standing(m3.Manifold.cylinder(12, 12 / np.tan(np.radians(slope_deg)) + 3, 3, 256))
 
 
@@ -47,7 +47,7 @@ def test_no_step_of_a_sphere_is_deeper_than_asked(radius: float, cusp: float, on
     low = np.maximum(at.tip_mm - at.height_mm, 0)
     away = np.maximum(np.abs(low - radius), np.abs(np.minimum(at.tip_mm, 2 * radius) - radius))
     free = at.height_mm[1:] >= 2 * LEAST
-    facets = np.cos(np.pi / 64)  # the normals of a tessellated sphere turn by half a facet
+    facets = np.cos(np.pi / 64)  # the normals of a tessellated sphere deviate by half a facet
     assert (at.height_mm[1:] * np.maximum(away[1:] / radius - 2 * (1 - facets) - np.pi / 64, 0))[free].max(initial=0) <= cusp
     assert at.height_mm[1:].min() >= LEAST - 1e-9
     assert at.height_mm[1:].max() <= MOST + 1e-9
@@ -86,7 +86,7 @@ def test_no_layer_of_any_stairs_is_thinner_than_the_least_or_thicker_than_the_mo
     stairs = sum((m3.Manifold.cube((10 * (len(rises) - k), 10, top)) for k, top in enumerate(tops)), m3.Manifold())
     at = layer_heights(from_manifold(stairs), adaptive(cusp, least, most), True)
     assert at.height_mm.min() >= least - 1e-9
-    few = len(at.tip_mm) <= 3  # too few to share what no layer between least and most can take: the nozzle is what bounds them
+    few = len(at.tip_mm) <= 3  # too few to divide a rise between `least` and `most`: then the nozzle is the limit
     assert at.height_mm.max() <= (0.4 if few else max(most, 0.25)) + 1e-9
     assert at.tip_mm[-1] == pytest.approx(max(tops[-1], least))
 

@@ -1,4 +1,4 @@
-"""Widths of the beads by kind and in the first layer on the plate."""
+"""Widths of beads by kind and in the first layer on the plate."""
 
 import manifold3d as m3
 import numpy as np

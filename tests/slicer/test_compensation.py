@@ -1,4 +1,4 @@
-"""Compensated sections, held against shapely's offsets and against what may not move."""
+"""Compensated sections, against shapely's offsets and against edges that must not move."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ def process(outline_mm: float, hole_mm: float) -> Process:
 
 
 def blocks(seed: int) -> Polygons:
-    """Some rectangles upon each other with some holes: all corners are right ones, where a mitred offset is one and the same."""
+    """Random rectangles united, with random holes: all corners are right angles, where every mitred offset is exact."""
     rng = np.random.default_rng(seed)
     rectangles = [Polygons.square(tuple(rng.uniform(2, 15, 2))).translate(tuple(rng.uniform(-10, 10, 2))) for _ in range(9)]
     return sum(rectangles[1:6], rectangles[0]) - sum(rectangles[7:], rectangles[6])

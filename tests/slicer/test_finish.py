@@ -1,4 +1,4 @@
-"""Sizes and tops: outsides and holes are compensated where there is air beside them, tops that stay visible are ironed."""
+"""Sizes and tops: outsides and holes are compensated where they face air, tops that stay visible are ironed."""
 
 import manifold3d as m3
 import numpy as np
@@ -18,12 +18,12 @@ LEANING = (0.6, 0.0, 0.8)
 
 
 def tube() -> Mesh:
-    """20 mm square with a hole of 10 mm square."""
+    """A 20 mm square with a 10 mm square hole."""
     return standing(m3.Manifold.cube((20, 20, 2), True) - m3.Manifold.cube((10, 10, 9), True))
 
 
 def outer_sizes_mm(sliced: SlicedPart) -> list[float]:
-    """Sizes along x of the outer walls of the second layer, plastic included."""
+    """Sizes along x of the outer walls of the second layer, to the edge of the plastic."""
     paths = [path for path in sliced.layers[1].paths if path.kind is Kind.OUTER_WALL]
     outside, hole = sorted((float(np.ptp(path.points[:, 0])) for path in paths), reverse=True)
     return [outside + 0.45, hole - 0.45]

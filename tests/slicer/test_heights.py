@@ -1,4 +1,4 @@
-"""Layers meet the top, whatever the part's height."""
+"""The last layer ends at the top of the part, at any height."""
 
 import numpy as np
 import pytest

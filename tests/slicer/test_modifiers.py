@@ -1,4 +1,4 @@
-"""Modifiers: inside a box, a mesh or a height range other settings hold, and nothing is lost or doubled where they meet."""
+"""Modifiers: other settings apply inside a box, a mesh or a height range, without loss or overlap at its border."""
 
 from dataclasses import replace
 from functools import cache
@@ -57,7 +57,7 @@ def density(layer: Layer, within: Zone) -> float:
 
 
 def walls_across(layer: Layer, x: float) -> int:
-    """How many walls a line along y crosses on its way from the middle of the block."""
+    """Number of walls that a line along y crosses on its way from the middle of the block."""
     count = 0
     for path in layer.paths:
         if path.kind in WALLS:
@@ -73,7 +73,7 @@ def speeds(layer: Layer, kind: Kind, right: bool) -> set[float]:
 
 LEFT_INSIDE, RIGHT_INSIDE = (
     Zone((x, -INSIDE_MM, 0.0), (x + INSIDE_MM - 1.0, INSIDE_MM, 1.0)) for x in (-INSIDE_MM, 1.0)
-)  # half a millimetre and more from where the two halves meet
+)  # half a millimetre and more from the border of the two halves
 
 
 def test_infill_inside_a_box_is_as_dense_as_its_settings_say_and_outside_as_the_process_says() -> None:
@@ -87,7 +87,7 @@ def test_a_box_of_another_pattern_has_its_lines_and_leaves_walls_alone() -> None
     assert density(other, RIGHT_INSIDE) == pytest.approx(0.2, rel=0.1)
     longest = {right: max(_steps(other, right)) for right in (False, True)}
     assert longest[False] > 15.0  # lines of a grid
-    assert longest[True] < 10.0  # sides of hexagons, and what runs along walls
+    assert longest[True] < 10.0  # sides of hexagons, and lines along walls
     walls = [[path.points.tobytes() for path in layer.paths if path.kind in WALLS] for layer in (plain, other)]
     assert sorted(walls[0]) == sorted(walls[1])
 
@@ -108,7 +108,7 @@ def test_a_box_has_as_many_walls_as_its_settings_say(order: str, process: int, i
     layer = sliced(part, f"process.walls={process}", f"process.wall_order={order}").layers[25]
     assert (walls_across(layer, -10.0), walls_across(layer, 10.0)) == (outside, inside)
     outer = [path for path in layer.paths if path.kind is Kind.OUTER_WALL]
-    assert len(outer) == 1  # one loop, which the border of the box does not part
+    assert len(outer) == 1  # one loop, which the border of the box does not split
     levels = [float(np.abs(path.points).max()) for path in layer.paths if path.kind in WALLS]
     assert levels == sorted(levels, reverse=order == "outer-first")
 

@@ -1,4 +1,4 @@
-"""Overhangs of each layer against closed formulas, and against what the search counts as needing support."""
+"""Overhangs of each layer against closed formulas, and against the search's support need."""
 
 from dataclasses import replace
 
@@ -20,7 +20,7 @@ from tests.shapes import ball, branch, standing, tee
 from tests.slicer.hand import cut, profile, whole
 
 CUBE, CONE = m3.Manifold.cube, m3.Manifold.cylinder
-CORNERS = 96  # of what is round
+CORNERS = 96  # of round solids
 LAYER_MM = 0.2
 
 
@@ -40,7 +40,7 @@ def gallows(reach_mm: float, depth_mm: float) -> Mesh:
 
 
 def funnel(angle_deg: float, foot_mm: float) -> Mesh:
-    """A cone on its head, 6 mm high, whose sides hang over by an angle from upright; foot_mm: radius at the platform."""
+    """A cone on its tip, 6 mm high, whose sides overhang by an angle from upright; foot_mm: radius at the build plate."""
     return standing(CONE(6, foot_mm, foot_mm + 6 * np.tan(np.radians(angle_deg)), CORNERS))
 
 
@@ -49,7 +49,7 @@ def disc_mm2(radius_mm: float) -> float:
 
 
 def hanging_mm2(overhangs: list[Overhang]) -> dict[int, float]:
-    """Area of what wants support by the layers that have any."""
+    """Overhanging area by layer, for the layers that have any."""
     return {i: overhang.hanging.area() for i, overhang in enumerate(overhangs) if not overhang.hanging.is_empty()}
 
 
@@ -177,6 +177,6 @@ def test_of_level_faces_the_slicer_supports_what_the_search_counts_within_a_hund
 
 @pytest.mark.parametrize("name", SLOPES)
 def test_of_slopes_they_agree_within_what_a_layer_at_either_end_is_wide(name: str) -> None:
-    """A slope is seen from the middle of its lowest layer to that of its highest."""
+    """The layers cover a slope only between the middle of its lowest layer and that of its highest."""
     hanging = sum(hanging_mm2(overhangs_of(SLOPES[name])).values())
     assert hanging == pytest.approx(needed_mm2(SLOPES[name]), rel=0.08, abs=1e-6)

@@ -1,4 +1,4 @@
-"""Parts sliced side by side."""
+"""Parts sliced in parallel."""
 
 import os
 import signal
@@ -103,7 +103,7 @@ def test_whatever_ends_the_parent_ends_its_processes(ended_by: signal.Signals) -
         try:
             children += [int(parent.stdout.readline()) for _ in range(2)]
             parent.send_signal(ended_by)
-            parent.communicate(timeout=10.0)  # until nobody holds the other end of the pipe
+            parent.communicate(timeout=10.0)  # until no process holds the other end of the pipe
         except BaseException:
             for process in (parent.pid, *children):
                 os.kill(process, signal.SIGKILL)

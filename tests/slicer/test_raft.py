@@ -1,4 +1,4 @@
-"""A raft: dense and wide where it must be, under all that stands, and the model a gap above it as it is on the plate."""
+"""A raft: dense and wide where needed, under the whole print, and the model a gap above it unchanged."""
 
 import manifold3d as m3
 import numpy as np
@@ -24,17 +24,17 @@ def raft_of(mesh: Mesh, *settings: str) -> list[Layer]:
 
 
 def model_of(sliced: SlicedPart) -> list[Layer]:
-    """The layers with something of the model."""
+    """The layers with beads of the model."""
     return [layer for layer in sliced.layers if not layer.is_of(*PROPS, Kind.SKIRT).all()]
 
 
 def square_mm2(beyond_mm: float) -> float:
-    """Area of a square of SIDE with round corners that reaches so far beyond."""
+    """Area of a square of SIDE, offset by beyond_mm with round corners."""
     return SIDE**2 + 4 * SIDE * beyond_mm + np.pi * beyond_mm**2
 
 
 def filled_mm3(beyond_mm: float, density: float, height_mm: float) -> float:
-    """An outline of solid plastic, lines of a density inside it, and one side's length of what joins them to a zigzag."""
+    """Volume of a solid outline, lines of a density inside it, and one side's length of connections between the lines."""
     line_mm = spacing_mm(0.45, height_mm)
     outline_mm2 = (4 * SIDE + 2 * np.pi * beyond_mm) * line_mm
     inside_mm2 = density * (square_mm2(beyond_mm) - outline_mm2) + (SIDE + 2 * beyond_mm) * line_mm

@@ -1,4 +1,4 @@
-"""A surface at the very height of a section: which layer it belongs to does not depend on rounding."""
+"""A surface exactly at the height of a section: rounding does not decide to which layer it belongs."""
 
 import manifold3d as m3
 import numpy as np
@@ -30,7 +30,7 @@ def round_channels() -> list[tuple[Mesh, float]]:
 
 
 def areas_mm2(mesh: Mesh, *settings: str) -> Floats:
-    """(layers, 7) of every layer what bridges, hangs, and is a ledge of it, its three kinds of skin and its sparse infill."""
+    """(layers, 7) areas of each layer: bridges, overhangs, ledges, its three kinds of skin and its sparse infill."""
     sections = section_part(whole(mesh), profile(*settings))
     overhangs = find_overhangs(sections)
     shells = build_shells(own_supports(sections, overhangs), overhangs)

@@ -1,4 +1,4 @@
-"""Sections as they are printed: what stands on the plate lies in the lowest layers."""
+"""Sections as printed: surfaces on the plate belong to the lowest layers."""
 
 import manifold3d as m3
 import numpy as np
@@ -12,7 +12,7 @@ from tests.slicer.hand import BARE, SOLID, profile, whole
 
 @pytest.mark.parametrize(("rise_mm", "share"), [(0.25, 1.0), (0.6, 0.5), (1.2, 0.25)])
 def test_a_base_that_is_not_quite_level_is_laid_on_the_plate_as_far_as_it_stands(rise_mm: float, share: float) -> None:
-    """A plate of 30 x 30 mm whose underside rises to one side: up to 0.3 mm it stands, beyond it hangs."""
+    """A plate of 30 x 30 mm whose underside rises to one side: up to 0.3 mm it rests on the plate, beyond that it overhangs."""
 
     def first_layer_mm3(rise_mm: float) -> float:
         corners = [(x, y, z) for x in (0, 30) for y in (0, 30) for z in (rise_mm * x / 30, 5)]

@@ -1,4 +1,4 @@
-"""Whole parts: plastic, places, frames, speeds, flow, determinism, errors."""
+"""Whole parts: plastic, positions, frames, speeds, flow, determinism, errors."""
 
 from collections.abc import Callable
 from functools import cache
@@ -20,8 +20,8 @@ from tests.shapes import ball, bowl, box, branch, hollow, standing
 from tests.slicer.hand import BARE, SOLID, content, cut, distances_mm, of_kind, profile, section_at, shared, volume_mm3, whole
 
 OWN = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.GAP, Kind.INFILL, Kind.SKIN, Kind.TOP_SKIN)
-BULGE = 0.04 * 0.45  # outer beads carry so much more, mm
-ROUNDING = 0.5 * 0.2 * (1 - np.pi / 4) - BULGE  # the round sides of outer beads leave this depth of the surface out, mm
+BULGE = 0.04 * 0.45  # surplus of outer beads, mm
+ROUNDING = 0.5 * 0.2 * (1 - np.pi / 4) - BULGE  # depth that the round sides of outer beads leave open, mm
 
 
 def cylinder() -> Mesh:
@@ -29,7 +29,7 @@ def cylinder() -> Mesh:
 
 
 def expected_mm3(mesh: Mesh, sliced: SlicedPart) -> float:
-    """The volume less what the round sides of the outermost beads leave out."""
+    """The volume less the space that the round sides of the outermost beads leave open."""
     return mesh.volume_mm3 - 0.2 * ROUNDING * sum(path.length_mm for path in of_kind(sliced, Kind.OUTER_WALL))
 
 
@@ -156,7 +156,7 @@ def test_a_part_lower_than_a_layer_is_printed_as_one() -> None:
     sliced = slice_part(whole(box(10, 10, 0.12)), profile(*SOLID))
     assert [layer.z_mm for layer in sliced.layers] == pytest.approx([0.12])
     assert [layer.height_mm for layer in sliced.layers] == pytest.approx([0.12])
-    assert sliced.volume_mm3 == pytest.approx(12.0, rel=0.035)  # lines that reach into the corners of a skin overlap there
+    assert sliced.volume_mm3 == pytest.approx(12.0, rel=0.035)  # lines that extend into the corners of a skin overlap there
 
 
 @pytest.mark.parametrize("walls", [0, 1, 50])
@@ -178,7 +178,7 @@ def test_the_same_part_gives_the_same_bytes() -> None:
 def test_every_path_has_length_and_width_and_speed() -> None:
     for path in of_kind(coarse_branch(), *OWN):
         assert path.length_mm > 0.04
-        assert 0.09 < path.width_mm < 0.91  # the least gap is 0.12 of a line, and its bead 0.04 mm wider
+        assert 0.09 < path.width_mm < 0.91  # the least gap is 0.12 of a line, and its bead is 0.04 mm wider
         assert 0 < path.speed_mm_s <= 80
         assert path.points.shape[1] == path.approach.shape[1] == 2
         assert (path.points[1:] != path.points[:-1]).any(axis=1).all()

@@ -1,4 +1,4 @@
-"""What a person marks on a part, in its layers: where none begins, and where no support is printed."""
+"""User zones on a part, in its layers: where no seam begins, and where no support is printed."""
 
 from dataclasses import replace
 from functools import cache
@@ -34,7 +34,7 @@ def without_seam(part: Part, *zones: AnyZone) -> Part:
 
 
 def bare(part: Part) -> Part:
-    """One that is supported nowhere."""
+    """A part that is supported nowhere."""
     return replace(part, no_support=Marked((Zone((-99.0, -99.0, -1.0), (99.0, 99.0, 99.0)),)))
 
 
@@ -43,7 +43,7 @@ def begins(sliced: SlicedPart) -> Floats:
 
 
 def leaning_out() -> Mesh:
-    """A wedge 10 mm wide on the platform and 26 mm 10 mm higher, 12 mm deep: its sides are 38.7 deg from upright."""
+    """A wedge 10 mm wide on the build plate and 26 mm at a height of 10 mm, 12 mm deep: its sides are 38.7 deg from upright."""
     return standing(m3.CrossSection([[(-5, 0), (5, 0), (13, 10), (-13, 10)]]).extrude(12).rotate((90, 0, 0)))
 
 
@@ -118,7 +118,7 @@ def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> N
     heights = Heights(tips_mm, np.full(100, 0.08), tips_mm - 0.04)
     sections = sections_at(block.mesh, heights.cut_mm, "process.layer_height_mm=0.3", "process.support_bottom_gap_mm=0.3")
     unwanted = marked_areas(marked.no_support, marked, block.mesh, heights.cut_mm)
-    stands = int(np.searchsorted(heights.bottom_mm, 4.3))  # the first layer that support on it would have
+    stands = int(np.searchsorted(heights.bottom_mm, 4.3))  # the first layer of support on top of it
     shut = unwanted_areas(replace(sections, part=marked, heights=heights, no_support=unwanted))
     assert (shut[stands].area(), shut[-1].area()) == (pytest.approx(400.0, rel=0.01), 0.0)
 
@@ -128,7 +128,7 @@ def test_a_box_that_leans_shuts_of_each_layer_what_lies_in_it() -> None:
     leaning = Zone((-5.0, -10.0, -5.0), (5.0, 10.0, 5.0), ((half, 0.0, -half), (0.0, 1.0, 0.0), (half, 0.0, half)))
     leaning = leaning.transform(np.eye(3), np.array([0.0, 0.0, 10.0]))
     shut = marked_areas(Marked((leaning,)), part, part.mesh, np.array([2.0, 6.0, 10.0]))
-    assert shut[-1].area() == pytest.approx(20.0 * 10.0 * 2.0**0.5)  # as wide as its side's diagonal half way up
+    assert shut[-1].area() == pytest.approx(20.0 * 10.0 * 2.0**0.5)  # as wide as the diagonal of its side at half height
 
 
 LEFT = Zone((-30.0, -30.0, -1.0), (0.0, 30.0, 40.0))

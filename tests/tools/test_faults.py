@@ -1,4 +1,4 @@
-"""A shorter run of the fault campaign, and proofs that its judge sees what is wrong."""
+"""A short run of the fault campaign, and tests that its judge detects faults."""
 
 from math import inf
 

@@ -1,4 +1,4 @@
-"""The book of choices and the weights that follow from it."""
+"""The file of choices and the weights fitted to it."""
 
 import json
 from collections import Counter
@@ -39,7 +39,9 @@ def test_weights_are_found_by_which_pairs_were_ordered() -> None:
 
 
 def test_no_weight_is_below_nothing() -> None:
-    differences = np.array([[1.0, -1.0], [2.0, -0.5], [0.5, -2.0]])  # the second figure speaks for itself
+    differences = np.array(
+        [[1.0, -1.0], [2.0, -0.5], [0.5, -2.0]]
+    )  # a fit without bounds gives the second figure a negative weight
     assert fit_choices.fitted(differences)[1] == 0.0
 
 

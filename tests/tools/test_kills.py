@@ -1,4 +1,4 @@
-"""The campaign of killed hosts: how its runs are judged, and a short one."""
+"""The campaign of killed hosts: how its runs are judged, and a short run."""
 
 import re
 import tempfile
@@ -17,7 +17,7 @@ from tools.campaigns import kills
 from tools.campaigns.kills import BAUD, IN_DOUBT, LAYERS, LIFT_MM, PROFILE, RING, START, campaign, judged, judged_cut
 
 CURVE_STROKES, CURVE_MM = 600, 24.0  # of a round wall, 0.25 mm long each
-STROKE = re.compile(r"G1 (X|E\d)")  # pushes filament
+STROKE = re.compile(r"G1 (X|E\d)")  # extrudes filament
 WHOLE = [[float(k), 0.0] for k in range(10)]
 
 
@@ -56,7 +56,7 @@ APPROACH = [[5.0, 0.0, 9.0, 0.0, 0.0, 0.0], [4.0, 0.0, 1.0, 0.0, 0.0, 0.8]]
 def test_a_cut_is_judged_by_moves_missing_and_doubled_and_by_the_height(
     rest: list[list[float]], gap: int, twice: int, off_mm: float
 ) -> None:
-    begun = [[4.5, 0.0, 1.0, 0.0, 0.0, 0.05]]  # the move under way when the power went: it does not count
+    begun = [[4.5, 0.0, 1.0, 0.0, 0.0, 0.05]]  # the interrupted move at the power failure does not count
     cut = judged_cut("any", 6, [*STROKES[:5], *begun, *APPROACH, *rest], STROKES)
     assert (cut.gap, cut.twice, cut.off_mm) == (gap, twice, pytest.approx(off_mm))
 
@@ -73,7 +73,7 @@ def test_power_cuts_lose_no_stroke_and_no_height_that_was_not_asked_for(
 
 
 def curved_program(layers: int = LAYERS // 2, strokes: int = CURVE_STROKES) -> list[str]:
-    """A round wall of short strokes, which the line brings hardly fast enough."""
+    """A round wall of short strokes, which the serial line can hardly deliver fast enough."""
     lines = [*START, "G0 Z60 F900", "G0 X10 Y10 F6000"]
     for layer in range(layers):
         lines += [";LAYER_CHANGE", f"G0 Z{60 + 0.2 * layer:.2f} F900"]
@@ -84,7 +84,7 @@ def curved_program(layers: int = LAYERS // 2, strokes: int = CURVE_STROKES) -> l
 
 
 class _TimedJournal(Journal):
-    """A journal that remembers when it held which line to be executed: in its file, and on the disk."""
+    """A journal that records when each executed line was noted in its file and on the disk."""
 
     def __init__(self, path: Path, now_s: Callable[[], float]) -> None:
         self.in_file: list[tuple[float, int]] = [(0.0, 0)]
@@ -93,7 +93,7 @@ class _TimedJournal(Journal):
         super().__init__(path, JournalHeading("p.gcode", "", "campaign", {}))
 
     def write(self, checkpoint: Checkpoint, hurry: bool = False) -> None:
-        """Note the time, too. What is not in a hurry reaches the disk once in SYNC_S."""
+        """Record the time, too. Without hurry, the disk is updated once in SYNC_S."""
         super().write(checkpoint, hurry)
         now_s = self._now_s()
         if hurry or now_s - self.on_disk[-1][0] >= SYNC_S:
@@ -102,9 +102,8 @@ class _TimedJournal(Journal):
 
 
 def count_repeats(build: BuildOptions, lines: list[str], moments: int = 1000, seed: int = 1) -> dict[str, tuple[float, int]]:
-    """Strokes that a print would do twice after a power cut: on average of random moments and at the worst one of all, for a
-    journal of which the whole file is left, and for one of which the disk's part is left.
-    """
+    """Strokes that a print would repeat after a power failure: mean over random moments and the worst case, for a journal
+    whose whole file is left, and for one of which only the synced part is left."""
     printer = VirtualPrinter(PROFILE.machine, build, baud=BAUD)
     with tempfile.TemporaryDirectory() as name, _TimedJournal(Path(name) / "journal", lambda: printer.now_s) as journal:
         print_lines(lines, PATH, BAUD, profile=PROFILE, medium=printer.medium, journal=journal)
@@ -128,7 +127,7 @@ def count_repeats(build: BuildOptions, lines: list[str], moments: int = 1000, se
 def test_at_no_moment_of_a_print_are_more_strokes_off_record_than_the_documented_bound(
     advanced: bool, most: int, usual: float
 ) -> None:
-    """What may wait in the planner, lines since the newest record, lines in flight: docs/serial.md, Journal and resume."""
+    """Lines in the planner, lines since the newest record, lines in flight: docs/serial.md, Journal and resume."""
     counts = count_repeats(BuildOptions(advanced_ok=advanced, rx_ring=RING), curved_program(layers=2, strokes=300))
     mean, worst = counts["file"]
     assert (worst <= most, mean <= usual) == (True, True), counts

@@ -1,4 +1,4 @@
-"""What the stream makes of a UART's bandwidth, in virtual time, and that its memory does not grow with the program."""
+"""The share of a UART's bandwidth that the stream uses, in virtual time, and memory independent of the program's length."""
 
 import tracemalloc
 from collections.abc import Iterator
@@ -31,7 +31,7 @@ def test_the_bench_s_lines_have_the_length_that_it_names() -> None:
 
 
 class Echo:
-    """A wire to a peer that takes every line at once and keeps nothing."""
+    """A line to a peer that acknowledges every command at once and stores nothing."""
 
     name = "echo"
 
@@ -39,7 +39,7 @@ class Echo:
         self._said = bytearray()
 
     def write(self, data: bytes) -> None:
-        """Every numbered line is acknowledged."""
+        """Acknowledge every numbered line."""
         for line in data.split(b"\n"):
             number, _, command = line[1:].partition(b" ")
             if command.startswith(b"M105"):
@@ -54,14 +54,14 @@ class Echo:
         return said
 
     def discard(self) -> None:
-        """Nothing is held back."""
+        """Nothing to discard."""
 
     def close(self) -> None:
-        """Nothing is held."""
+        """Nothing to close."""
 
 
 def streamed_bytes(count: int) -> int:
-    """Memory, at most, of a print of so many lines that are made while they are sent."""
+    """Peak memory of a print whose lines are generated while they are sent."""
 
     def lines() -> Iterator[str]:
         for k in range(count):

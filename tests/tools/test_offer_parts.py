@@ -1,4 +1,4 @@
-"""Which alternatives are offered to a judge."""
+"""Selection of the alternatives that are offered to a judge."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def plane(offset_mm: float, lean_deg: float = 0.0) -> Plane:
     [
         (UPRIGHT, (plane(20.0),), True),
         (UPRIGHT, (plane(22.0, 10.0),), True),
-        (UPRIGHT, (plane(23.0),), False),  # of 60 mm more than 4 %
+        (UPRIGHT, (plane(23.0),), False),  # more than 4 % of 60 mm
         (UPRIGHT, (plane(20.0, 16.0),), False),
         (UPRIGHT, (), False),
         (UPRIGHT, (plane(20.0), plane(40.0)), False),

@@ -1,4 +1,4 @@
-"""The print campaign: the models that it lays out, the settings that it draws, its table, and a small run of it."""
+"""The print campaign: its models, its random settings, its table, and a small run."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Marks at the seams of joints: none on a box that is cut askew; what is planted there is counted."""
+"""Marks at the seams of joints: none on a box that is cut askew; planted marks are counted."""
 
 import pytest
 
@@ -19,7 +19,7 @@ def printed() -> tuple[tuple[str, ...], Profile]:
 
 
 def counted(lines: list[str], profile: Profile) -> list[str]:
-    """What is left on the rim of the part above by itself."""
+    """The marks on the rim of the part above."""
     program = dry_run(lines, profile, known=()).program
     ((_, outlines),) = seams.joints(program, profile.machine)
     return [mark.what for outline in outlines if outline.part == 2 for mark in seams.marks(program, outline)]

@@ -1,4 +1,4 @@
-"""Tools: every benchmark, campaign, check and maker still finds what it uses."""
+"""Tools: every benchmark, campaign, check and maker still finds the names that it uses."""
 
 import runpy
 from pathlib import Path

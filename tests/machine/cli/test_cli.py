@@ -16,7 +16,7 @@ from machine.cli.cli import main
 from mdp.save import FOLDER_FILES, stl
 from tests import shapes
 
-# So coarse a T, whose arms show high stairs and are small beside their seams, is cut all the same.
+# A T this small, with high stair-stepping on its arms and small arms compared with their seams, is still cut.
 IN_PARTS = ["--as-is", "--set", "search.seam_mm=0.8", "--set", "search.stair_weight=0.01"]
 FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.3", "--set", "process.first_layer_height_mm=0.3"]
 FAST += ["--set", "process.line_width_mm=0.6", "--set", "process.scale=0.6", "--set", "process.infill_density=0.05"]
@@ -278,7 +278,7 @@ def test_several_models_are_exported_as_one_plate_and_a_number_stands_for_copies
     assert Path("a.gcode").read_bytes() == Path("b.gcode").read_bytes()
     figures = json.loads(Path("a.json").read_text())
     assert (figures["parts"], [finding["code"] for finding in figures["findings"]]) == (1, ["uncalibrated"])
-    assert np.ptp(figures["bounds_mm"], axis=0)[1] == pytest.approx(0.6 * (10 + 20 + 10) + 2 * 5, abs=0.7)  # a line less
+    assert np.ptp(figures["bounds_mm"], axis=0)[1] == pytest.approx(0.6 * (10 + 20 + 10) + 2 * 5, abs=0.7)  # less one line width
     assert main(["simulate", "large.stl", "small.stl:2", *plate, "--json", "model.json"]) == 0
     assert json.loads(Path("model.json").read_text())["model"]["outside"] == 0.0
 
@@ -383,7 +383,7 @@ def test_profiles_show_and_check_agree(folder: Path, capsys: pytest.CaptureFixtu
 
 
 def _program(folder: Path) -> Path:
-    """Six hours of careful strokes over a hot bed."""
+    """Six hours of slow strokes over a hot bed."""
     lines = ["G21", "G90", "M83", "G28 X Y Z", "G92 A0 C0", "M140 S60", "M190 S60", "M104 S210", "M109 S210", "G0 Z0.2 F600"]
     lines += [f"G1 X{40 * (k % 2)} E1.0 F60" for k in range(1, 600)]
     file = folder / "long.gcode"
@@ -397,7 +397,7 @@ def test_an_interrupted_print_ends_with_heaters_off_and_exit_130(folder: Path) -
     pipe = subprocess.PIPE
     for process, number in [
         (subprocess.Popen(command, stderr=pipe, stdout=pipe, text=True, cwd=Path(__file__).parents[3]), number)
-        for number in (signal.SIGINT, signal.SIGTERM)  # both heat up at once
+        for number in (signal.SIGINT, signal.SIGTERM)  # both processes heat up at the same time
     ]:
         _wait_for(process, "printing:")
         os.kill(process.pid, number)
@@ -427,7 +427,7 @@ PIPELINE = "machine.pipeline.pipeline"
         (PIPELINE, "read_model", 0.0, []),
         (PIPELINE, "slice_parts", 0.2, []),
         (PIPELINE, "dry_run", 0.0, []),
-        ("profiles.files", "_umask", 0.0, []),  # between the file's content and its name
+        ("profiles.files", "_umask", 0.0, []),  # after the file's content is written, before it is renamed
         ("machine.cli.commands.export", "write_json", 0.0, ["out.gcode"]),
     ],
 )
@@ -436,7 +436,7 @@ def test_an_interrupted_export_leaves_no_file_half_written_and_no_process(
 ) -> None:
     script = INTERRUPTED.format(module=module, stage=stage, later_s=later_s)
     words = ["export", "demo:bracket", "--as-is", "--parts", "1", "-o", "out.gcode", "--json", "out.json"]
-    words += [] if later_s else [*COARSE, "--set", "process.scale=0.2"]  # else it would end before it is interrupted
+    words += [] if later_s else [*COARSE, "--set", "process.scale=0.2"]  # otherwise it would end before the interrupt
     given = {"PYTHONPATH": str(Path(__file__).parents[3])}
     with subprocess.Popen(
         [sys.executable, "-c", script, *words], stderr=subprocess.PIPE, text=True, start_new_session=True, env=os.environ | given

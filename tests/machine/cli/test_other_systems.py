@@ -1,4 +1,4 @@
-"""The common commands where much of POSIX is missing, as on Windows: terminals, forks, signals, an encoding of all letters."""
+"""Common commands where parts of POSIX are missing, as on Windows: terminals, forks, signals and a UTF-8 encoding."""
 
 import json
 import os

@@ -1,4 +1,4 @@
-"""A small print of three parts, sliced as a user's would be: a foot, a neck that leans from it, a head that leans from that."""
+"""A small print of three parts, sliced as for a user: a foot, a neck that leans from it, a head that leans from the neck."""
 
 from functools import cache
 
@@ -34,7 +34,7 @@ NECK_BASE, HEAD_BASE = leaning(0.0, 15.0, (0.0, 0.0, 8.0)), leaning(-10.0, 8.0, 
 
 @cache
 def bent(machine: str) -> tuple[Profile, Mesh, tuple[str, ...]]:
-    """Profile, model and G-code of the three parts on a machine."""
+    """Profile, model and G-code of the three parts for a machine."""
     profile = load(machine=machine)
     foot = FOOT.trim_by_plane(-NECK_BASE.normal, -NECK_BASE.offset_mm)
     neck = NECK.trim_by_plane(-HEAD_BASE.normal, -HEAD_BASE.offset_mm)

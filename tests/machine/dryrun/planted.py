@@ -1,4 +1,4 @@
-"""Faults planted into a good program by editing its text: what a person, a script or a damaged disk may do to a file."""
+"""Faults planted into a valid program by editing its text, as a user, a script or a damaged disk may change a file."""
 
 import re
 from collections.abc import Callable, Iterable
@@ -16,7 +16,7 @@ HEAT_OFF = re.compile(r"M104 [SP]0$")
 
 @dataclass(frozen=True)
 class Fault:
-    """code: of a finding that tells it, in this part and (unless 0) this layer."""
+    """An edit and the finding that reports it: code, part and (unless 0) layer."""
 
     name: str
     code: str
@@ -27,21 +27,21 @@ class Fault:
 
 
 def part_of(lines: Lines, index: int) -> range:
-    """Places of a part's lines, from its ;PART: comment to before the way to the next turn."""
+    """Indices of a part's lines, from its ;PART: comment to the travel before the next turn."""
     first = next(k for k, line in enumerate(lines) if line.startswith(f";PART:{index} "))
     after = next(k for k in range(first + 1, len(lines)) if lines[k].startswith(";TYPE:Custom"))
     return range(first, after)
 
 
 def layers_of(lines: Lines, index: int) -> list[range]:
-    """Places of the lines of a part's layers."""
+    """Indices of the lines of each layer of a part."""
     part = part_of(lines, index)
     firsts = [k for k in part if lines[k] == ";LAYER_CHANGE"]
     return [range(a, b) for a, b in zip(firsts, [*firsts[1:], part.stop], strict=True)]
 
 
 def on(places: Callable[[Lines], Iterable[int]], change: Callable[[str], str | None]) -> Edit:
-    """Change the lines at some places; None takes a line out."""
+    """Change the lines at some indices; None removes a line."""
 
     def edit(lines: Lines) -> Lines:
         changed = {k: change(lines[k]) for k in places(lines)}
@@ -56,12 +56,12 @@ def part(index: int) -> Callable[[Lines], Iterable[int]]:
 
 
 def layers(index: int, first: int, count: int = 1) -> Callable[[Lines], Iterable[int]]:
-    """Layers of a part, counted from 1."""
+    """Indices of the lines of some layers of a part, counted from 1."""
     return lambda lines: [k for layer in layers_of(lines, index)[first - 1 : first - 1 + count] for k in layer]
 
 
 def nth(pattern: str, which: int = 0, within: int = 0) -> Callable[[Lines], Iterable[int]]:
-    """The place of the n-th line that fits; within: a part."""
+    """The index of the n-th matching line; within: a part, 0: the whole file."""
 
     def places(lines: Lines) -> Iterable[int]:
         among = part_of(lines, within) if within else range(len(lines))
@@ -71,7 +71,7 @@ def nth(pattern: str, which: int = 0, within: int = 0) -> Callable[[Lines], Iter
 
 
 def word(letter: str, change: Callable[[float], float], only: str = "G[01] ") -> Callable[[str], str]:
-    """Change the number of one word of moves."""
+    """Scale the number of one word of moves."""
 
     def changed(line: str) -> str:
         if not re.match(only, line):
@@ -86,7 +86,7 @@ def drop(pattern: str) -> Callable[[str], str | None]:
 
 
 def insert(places: Callable[[Lines], Iterable[int]], *added: str) -> Edit:
-    """Put lines before a place."""
+    """Insert lines before an index."""
 
     def edit(lines: Lines) -> Lines:
         at = next(iter(places(lines)))
@@ -96,7 +96,7 @@ def insert(places: Callable[[Lines], Iterable[int]], *added: str) -> Edit:
 
 
 def before_turn(lines: Lines, index: int) -> int:
-    """The place of the line that lifts the tip after a part's last bead, when the table turns to the next one."""
+    """The index of the line that lifts the tip after a part's last bead, before the table turns to the next part."""
     stop = part_of(lines, index).stop
     part_of(lines, index + 1)
     return max(k for k in range(stop) if lines[k] == ";WIPE_END") + 1
@@ -107,7 +107,7 @@ def everywhere(lines: Lines) -> Iterable[int]:
 
 
 def amid(index: int, layer: int) -> Callable[[Lines], Iterable[int]]:
-    """A place between two strokes, behind the first lines of a layer."""
+    """An index between two strokes, after the first lines of a layer."""
 
     def places(lines: Lines) -> Iterable[int]:
         begun = layers_of(lines, index)[layer - 1][8:]
@@ -132,7 +132,7 @@ def purged_at_middle(lines: Lines) -> Lines:
 
 
 def turn_to(index: int) -> Callable[[Lines], Iterable[int]]:
-    """The place of the line that turns the table to a part's pose."""
+    """The index of the line that turns the table to a part's pose."""
 
     def places(lines: Lines) -> Iterable[int]:
         begin = part_of(lines, index).start
@@ -171,7 +171,7 @@ def along_a_bead(lines: Lines) -> Lines:
 
 
 def still(line: str) -> str | None:
-    """The fan off at the beginning of a layer, and never on."""
+    """The fan off at the beginning of a layer, and never on again."""
     return "M107" if line.startswith(";HEIGHT") else drop("M106")(line)
 
 
@@ -199,7 +199,7 @@ def extruding_travels(push: Callable[[float], float]) -> Edit:
 
 
 def moved_part(lines: Lines, index: int, behind: int) -> Lines:
-    """A part with its turn put behind another one."""
+    """A part with its turn, moved after another part."""
     blocks = {k: turn_and_part(lines, k) for k in (index, behind)}
     text = [line for k, line in enumerate(lines) if k not in blocks[index]]
     at = len([k for k in range(blocks[behind].stop) if k not in blocks[index]])
@@ -207,7 +207,7 @@ def moved_part(lines: Lines, index: int, behind: int) -> Lines:
 
 
 def turn_and_part(lines: Lines, index: int) -> range:
-    """From the turn before a part to the turn behind it."""
+    """Indices from the turn before a part to the turn after it."""
     body = part_of(lines, index)
     return range(body.start - 2, body.stop)
 
@@ -221,7 +221,7 @@ def without_part(index: int) -> Edit:
 
 
 def repeated(places: Callable[[Lines], Iterable[int]]) -> Edit:
-    """Lines that come twice."""
+    """Lines that occur twice."""
 
     def edit(lines: Lines) -> Lines:
         block = list(places(lines))
@@ -239,7 +239,7 @@ def swapped_layers(index: int, first: int) -> Edit:
 
 
 def crossed_low(lines: Lines) -> Lines:
-    """After the turn down first, then across."""
+    """After a turn, first down and then across."""
     begin = part_of(lines, 3).start
     ways = [k for k in range(begin, begin + 8) if lines[k].startswith("G0")]
     edited = list(lines)

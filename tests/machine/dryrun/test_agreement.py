@@ -19,7 +19,7 @@ BOX = shapes.box(10.0, 10.0, 10.0)
 
 
 def filled_box(layers: int, aside_mm: float = 0.0) -> list[str]:
-    """Layers of parallel beads 0.4 mm apart in a 10 mm box about the axis."""
+    """Layers of parallel beads 0.4 mm apart in a 10 mm box centred on the axis."""
     lines = ["G28", "M83", "M104 S200", "M109 S200", ";TYPE:Solid infill", ";WIDTH:0.4", ";HEIGHT:0.2"]
     for layer in range(layers):
         lines.append(f"G0 Z{0.2 * (layer + 1):.1f} F600")
@@ -58,7 +58,7 @@ def test_a_box_printed_two_tenths_aside_is_within_half_a_line_and_one_farther_as
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro", "trident_5axis"])
 def test_a_table_whose_centre_lies_elsewhere_puts_tilted_parts_outside_the_model(machine: str) -> None:
     profile, decomposition, _, _ = printed(machine)
-    lines = [line for line in text(machine) if not line.startswith("; ")]  # so that no comment gives it away
+    lines = [line for line in text(machine) if not line.startswith("; ")]  # without comments that would reveal it
     x, y, z = profile.machine.tilt.point_mm
     moved = profile.machine.tilt.model_copy(update={"point_mm": (x, y + 2.0, z - 3.0)})
     wrong = profile.model_copy(update={"machine": profile.machine.model_copy(update={"tilt": moved})})
@@ -67,7 +67,7 @@ def test_a_table_whose_centre_lies_elsewhere_puts_tilted_parts_outside_the_model
 
 
 def untold(lines: Lines) -> Lines:
-    """A program that does not tell what its parts come to, as another slicer's does not."""
+    """A program that does not state the contents of its parts, like another slicer's."""
     return [line for line in lines if not line.startswith(";CONTENTS")]
 
 
@@ -90,7 +90,7 @@ def test_the_finding_names_the_part_and_the_direction_on_the_table() -> None:
 
 
 def wedge() -> Mesh:
-    """A block of 20 by 20 by 10 mm, whose left side leans inward by 45 degrees."""
+    """A block of 20 by 20 by 10 mm whose left side leans inward by 45 degrees."""
     corners = [(x + max(z * (x < 0), 0.0), y, z) for x in (-10.0, 10.0) for y in (-10.0, 10.0) for z in (0.0, 10.0)]
     return mesh_of(m3.Manifold.hull_points(np.array(corners)))
 
@@ -98,7 +98,7 @@ def wedge() -> Mesh:
 def test_walls_of_another_slope_on_each_side_lie_half_their_width_inside_the_model() -> None:
     lines = ["G28", "M83", "M104 S200", "M109 S200", ";TYPE:Outer wall", ";WIDTH:0.4", ";HEIGHT:0.2"]
     for layer in range(50):
-        left = 0.2 * (layer + 0.5) - 9.8  # at the middle of the layer
+        left = 0.2 * (layer + 0.5) - 9.8  # in the middle of the layer
         lines += [f"G0 Z{0.2 * (layer + 1):.1f} F600", f"G0 X{left:.3f} Y-9.8 F6000"]
         lines += [f"G1 X{x:.3f} Y{y} E0.5 F600" for x, y in ((9.8, -9.8), (9.8, 9.8), (left, 9.8), (left, -9.8))]
     ((_, by_mm),) = shifts(dry_run(lines, load()), triangle_tree(wedge())).values()

@@ -1,4 +1,4 @@
-"""The balance of plastic and room against closed formulas, and against faults planted into a good program."""
+"""The balance of plastic and space, against closed formulas and with faults planted into a valid program."""
 
 from math import cos, nextafter, pi, radians, sin, tan
 
@@ -60,7 +60,7 @@ def test_a_bar_laid_sideways_is_not_lost_to_a_rounding_of_its_direction(beyond: 
 
 @pytest.mark.parametrize("slant_deg", [0.0, 30.0, 60.0])
 def test_a_slanted_bar_is_left_through_its_top_or_its_side(slant_deg: float) -> None:
-    """Turned about Y by the slant, the top of a bar is the plane z = -x tan, as far as its end."""
+    """Turned about Y by the slant, the top of a bar is the plane z = -x tan, up to its end."""
     slant = radians(slant_deg)
     along, up = (cos(slant), 0.0, -sin(slant)), (sin(slant), 0.0, cos(slant))
     lattice = lattice_over(FIELD, 0.05)

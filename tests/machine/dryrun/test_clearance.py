@@ -25,7 +25,7 @@ def _with(head: Head, radius_mm: float = 100.0) -> Profile:
 
 
 def _plate(machine: Machine, pose: Pose) -> np.ndarray:
-    """Points all over the plate's top and bottom rims, in the machine frame."""
+    """Sample points on the plate's top and bottom rims, in the machine frame."""
     around = np.linspace(0, 2 * pi, 181)
     rim = np.column_stack([np.cos(around), np.sin(around), np.zeros(181)]) * machine.table.radius_mm
     return machine_points(machine, pose, np.vstack([rim, rim - [0, 0, machine.table.thickness_mm]]))
@@ -57,7 +57,7 @@ def test_over_a_wide_table_a_body_is_clear_exactly_above_the_known_height(tilt: 
     body = Box(name="duct", min_mm=(-1.0, -1.0, height), max_mm=(1.0, reach, height + 10.0))
     profile = _with(Head(nozzle_mm=0.4, silhouette_mm=[(0.01, 0.0)], boxes=[body]), 1000.0)
     origin = machine_points(profile.machine, Pose(tilt, 0.0), np.zeros((1, 3)))[0]
-    least = reach * sin(radians(tilt)) / cos(radians(tilt)) - height  # over the tip's own place on the plane, along z
+    least = reach * sin(radians(tilt)) / cos(radians(tilt)) - height  # relative to the tip's position on the plane, along z
     for above, clear in ((0.05, True), (-0.05, False)):
         z = origin[2] + max(least, 0.02) + above
         if least > 0.1:

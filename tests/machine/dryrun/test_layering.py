@@ -1,4 +1,4 @@
-"""Layers: what spans sparse infill or support is no finding, a layer whose beads are gone is one, whatever lies above it."""
+"""Layers: beads over sparse infill or support are not reported; a layer without beads is, whatever is above it."""
 
 import re
 from functools import cache
@@ -24,7 +24,7 @@ SETTINGS = [
 ]  # fmt: skip
 
 
-# a grid, lightning, and the thinnest and the densest infill
+# a grid, lightning, and the sparsest and the densest infill
 TELLING = [SETTINGS[0], SETTINGS[6], SETTINGS[8], SETTINGS[10]]
 
 

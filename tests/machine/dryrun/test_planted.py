@@ -1,4 +1,4 @@
-"""Every fault planted into a good program of three parts is found, with its line, part and layer."""
+"""Every fault planted into a valid program of three parts is found with its line, part and layer."""
 
 import pytest
 
@@ -24,7 +24,7 @@ def test_other_firmwares_and_other_axes_hide_no_fault(name: str, machine: str) -
     profile, _, lines = bent(machine)
     fault = next(fault for fault in FAULTS if fault.name == name)
     found = {f.code for f in dry_run(fault.edit(list(lines)), profile).errors}
-    assert fault.code in found or (name == "no homing" and machine == "linuxcnc_xyzac")  # which homes before any program
+    assert fault.code in found or (name == "no homing" and machine == "linuxcnc_xyzac")  # LinuxCNC homes before a program
 
 
 @pytest.mark.parametrize("name", REFUSED)

@@ -1,4 +1,4 @@
-"""The field of heights against brute force over points, and beads laid in air, beside each other and on each other."""
+"""The height field against brute force over points; beads printed in air, beside each other and on each other."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def _field(lines: list[Line], z: float) -> Field:
 
 
 def _exact_depth(lines: list[Line], above_tip: float, start: Place, end: Place, grown: float) -> float:
-    """Depth of the head, its silhouette and boxes grown by so much to all sides, in lines so far above its tip, by shapely."""
+    """Depth of the head in lines, by shapely: silhouette and boxes grown on all sides, the lines above_tip above its tip."""
     move, plastic = LineString([start, end]), MultiLineString(lines)
     radii, heights = np.array(MACHINE.head.silhouette_mm).T
     radius = max(move.distance(plastic) - grown, 0.0)

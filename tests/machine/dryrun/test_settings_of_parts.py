@@ -1,4 +1,4 @@
-"""What a part's own settings ask for is no fault."""
+"""A part's own settings cause no finding."""
 
 from machine.dryrun import dry_run
 from profiles.part_settings import PartSettings
@@ -7,7 +7,7 @@ from tests.machine.dryrun.planted import IN_2_1, Edit, fan_off, insert, layers, 
 
 
 def codes(edit: Edit, **of_part_2: float) -> set[str]:
-    """Errors of the edited program, but for what its comments tell of the parts' filament."""
+    """Errors of the edited program, except for the filament that its comments state for the parts."""
     profile, _, lines = bent("generic_ac")
     own = [PartSettings(part=2, process=of_part_2)] if of_part_2 else []
     run = dry_run(edit(list(lines)), profile.model_copy(update={"parts": own}))

@@ -1,4 +1,4 @@
-"""Inside, distances and beads, against solid angles, trimesh's nearest points and every bar looked at by itself."""
+"""Inside tests, distances and beads, against solid angles, trimesh's nearest points and each bar computed alone."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ def points_about(mesh: Mesh, seed: int, count: int = 60) -> Floats:
 
 
 def windings(points: Floats, mesh: Mesh) -> Floats:
-    """How often the surface winds about each point: the solid angles of its faces (Van Oosterom and Strackee 1983)."""
+    """Winding number of the surface about each point: the solid angles of its faces (Van Oosterom and Strackee 1983)."""
     corners = mesh.vertices[mesh.faces][None] - points[:, None, None]
     a, b, c = (corners[:, :, k] for k in range(3))
     p, q, r = (np.linalg.norm(side, axis=2) for side in (a, b, c))
@@ -33,7 +33,7 @@ def windings(points: Floats, mesh: Mesh) -> Floats:
 
 
 def distances_mm(points: Floats, mesh: Mesh) -> Floats:
-    """(n, m) of each point from each face, by trimesh."""
+    """(n, m) distances of points from faces, by trimesh."""
     m = len(mesh.faces)
     triangles = np.tile(mesh.vertices[mesh.faces], (len(points), 1, 1))
     each = np.repeat(points, m, axis=0)
@@ -110,7 +110,7 @@ def test_a_point_is_filled_where_it_lies_in_some_bar_below_its_segment(seed: int
     along = np.cross(ups, rng.normal(size=(count, 3)))
     starts = rng.uniform(-8.0, 8.0, (count, 3))
     segments = np.stack([starts, starts + along * rng.uniform(0.0, 6.0, (count, 1))], axis=1)
-    segments[0, 1] = segments[0, 0]  # of no length
+    segments[0, 1] = segments[0, 0]  # of zero length
     width, height = rng.uniform(0.3, 2.0, count), rng.uniform(0.1, 1.0, count)
     shape = (23, 24, 25)
     places = -9.0 + 0.75 * np.indices(shape).reshape(3, -1).T

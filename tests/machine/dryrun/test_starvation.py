@@ -1,4 +1,4 @@
-"""What the dry run says of a line that is too slow, held against the planner of the simulated printer."""
+"""The finding for a line that is too slow, compared with the planner of the simulated printer."""
 
 from math import cos, sin
 

@@ -1,4 +1,4 @@
-"""What is known of any line of a program: where the axes stand after it, how long the rest takes, how many layers a part has."""
+"""The state at any line of a program: axis positions after it, remaining time, and the number of layers of its part."""
 
 import pytest
 

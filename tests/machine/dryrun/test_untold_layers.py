@@ -1,4 +1,4 @@
-"""Files that tell no heights of layers."""
+"""Files that do not state the heights of layers."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""A part on plastic is hotter from its first bead on: the heat is asked for before the turn and waited for after it."""
+"""A part on plastic is hotter from its first bead: its temperature is set before the turn and waited for after it."""
 
 import pytest
 
@@ -23,7 +23,7 @@ def test_one_wait_stands_behind_each_turn_and_the_wish_before_it(machine: str) -
 
 
 def test_the_wait_counts_with_what_the_turn_has_not_covered() -> None:
-    """Ten degrees at 1.5 a second, less the turn, and the ten seconds for which the heat has to be steady."""
+    """The wait takes the time to heat ten degrees at 1.5 a second, less the turn, and the ten seconds of steady temperature."""
     profile, _, lines = bent("generic_ac")
     run = dry_run(lines, profile)
     assert len(run.waits) == 2

@@ -1,4 +1,4 @@
-"""A firmware that exists only here: written as CONTRIBUTING.md tells how to add one."""
+"""An invented firmware, written as CONTRIBUTING.md describes."""
 
 from machine.firmware.dialect import Command, Dialect
 from machine.firmware.firmware import Firmware, LineRules, SimulationRules

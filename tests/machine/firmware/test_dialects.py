@@ -1,4 +1,4 @@
-"""The same program in every firmware's words, and every text read back to the same print."""
+"""One program in the words of every firmware, each text read back to the same print."""
 
 import re
 from dataclasses import replace
@@ -33,7 +33,7 @@ EACH = pytest.mark.parametrize(("dialect", "coordinates"), MODES)
 STARTS = {
     "linuxcnc": "M140 P{bed_c}\nM109 P{first_layer_nozzle_c}\nG92 {tilt}0 {turn}0",
     "grblhal": "M140 S{bed_c}\nM109 S{first_layer_nozzle_c}\nG92 {tilt}0 {turn}0",
-    "klipper": load().machine.gcode.start.replace("M17\n", ""),  # which Klipper does not know
+    "klipper": load().machine.gcode.start.replace("M17\n", ""),  # Klipper does not know this command
     "klipper_steppers": "M140 S{bed_c}\nG28 X Y Z\nMANUAL_STEPPER STEPPER={tilt_stepper} SET_POSITION=0",
 }
 GOLDEN = File(__file__).parents[1] / "programs"
@@ -41,7 +41,7 @@ ENDS = {"linuxcnc": "M104 P0\nM107"}
 
 
 def profile(dialect: str, coordinates: str = "table", machine: str = "generic_ac", settings: tuple[str, ...] = ()) -> Profile:
-    """A profile whose machine has that firmware, its tilt axis beside the plate and its turn axis off the zero."""
+    """A profile with a firmware's dialect, whose tilt axis lies beside the plate and whose turn axis is off the zero."""
     loaded = load(machine=machine, settings=[f"machine.dialect={dialect}", f"machine.coordinates={coordinates}", *settings])
     axes = {
         "tilt": loaded.machine.tilt.model_copy(update={"point_mm": (0.0, 3.5, -12.0)}),
@@ -55,14 +55,14 @@ def profile(dialect: str, coordinates: str = "table", machine: str = "generic_ac
 
 @cache
 def both(dialect: str, coordinates: str) -> tuple[Profile, tuple[str, ...], ParsedProgram]:
-    """The post and the arm as text, and read back."""
+    """The post and the arm as G-code, and as parsed again."""
     chosen = profile(dialect, coordinates)
     lines = tuple(write_gcode(printed()[3], chosen))
     return chosen, lines, parse_gcode(lines, chosen.machine)
 
 
 def golden(dialect: str, coordinates: str) -> list[str]:
-    """The commands of a print that needs a firmware's every word: round walls, heat, fans, accelerations, a pause, a filament."""
+    """The commands of a print that uses every word of a firmware: arcs, heat, fans, accelerations, a pause, a filament change."""
     wanted = ("material.pressure_advance=0.04", "process.acceleration_mm_s2=900", "machine.purge_mm=20", "machine.arcs=true")
     chosen = profile(dialect, coordinates, settings=wanted)
     decomposition = post_and_arm(chosen.machine)
@@ -84,13 +84,13 @@ def test_every_word_of_a_firmware_stands_as_in_the_golden_text(dialect: str, coo
 
 
 def laid(machine: Machine, parsed: ParsedProgram) -> np.ndarray:
-    """(n, 4) where the tip ends on the workpiece, and the filament so far, of every stroke."""
+    """(n, 4) end of every stroke on the workpiece, with the filament so far, from the parsed text."""
     strokes = parsed.kind == MoveKind.EXTRUDE
     return np.column_stack([workpiece_path(machine, parsed.end[strokes]), parsed.filament_mm[strokes]])
 
 
 def wanted(machine: Machine, program: MachineProgram) -> np.ndarray:
-    """The same of the program itself."""
+    """(n, 4) end of every stroke on the workpiece, with the filament so far, from the program itself."""
     start, end, _ = straight_moves(program, level(machine))
     moved = np.linalg.norm(end[:, :3] - start[:, :3], axis=1) > 1e-9
     strokes = moved & (end[:, 5] > start[:, 5])
@@ -141,7 +141,7 @@ def test_speeds_are_read_back(dialect: str, coordinates: str) -> None:
 
 
 class TestWords:
-    """What is particular to a firmware stands in its text."""
+    """The particular words of each firmware."""
 
     def lines(self, dialect: str, coordinates: str = "table") -> list[str]:
         return [line for line in both(dialect, coordinates)[1] if not line.startswith(";")]
@@ -191,7 +191,7 @@ class TestWords:
     def test_grblhal_counts_followed_places_from_the_turn_axis(self) -> None:
         ours, theirs = both("marlin", "workpiece")[2], both("grblhal", "workpiece")[2]
         assert ours.end[-1] == pytest.approx(theirs.end[-1], abs=2e-3)
-        assert [line for line in self.lines("grblhal", "workpiece") if " Z-0.550" in line]  # 0.2 less the axis's 0.75
+        assert [line for line in self.lines("grblhal", "workpiece") if " Z-0.550" in line]  # 0.2 less the 0.75 of the axis
 
 
 def test_a_firmware_that_cannot_follow_the_table_is_refused_for_workpiece_coordinates() -> None:
@@ -214,7 +214,7 @@ def test_any_program_comes_back_in_any_dialect(dialect: str, coordinates: str, p
 
 
 def turned_program(parts: list) -> MachineProgram:
-    """Parts of (tilt, turn, points): each one stroke at its pose, with a retraction between."""
+    """Parts from (tilt, turn, points): each is one stroke in its pose, with a retraction between them."""
     moves: list = []
     at = np.array([0.0, 0.0, 90.0])
     moves += [Travel(np.array([at, at]), 10.0), Travel(np.array([at, at]), 10.0)]

@@ -1,4 +1,4 @@
-"""A firmware is one file and one line: with those it is written, dry-run, streamed to, simulated, identified and calibrated."""
+"""A new firmware needs one file and one table line to be written, dry-run, streamed, simulated, identified and calibrated."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,7 @@ from tests.machine.virtual_printer import PATH, VirtualPrinter
 
 @pytest.fixture
 def profile(monkeypatch: pytest.MonkeyPatch) -> Profile:
-    """A machine with the made-up firmware, which has its line in the table."""
+    """A machine with the invented firmware, which is registered in the table."""
     monkeypatch.setattr(firmware, "FIRMWARES", (*firmware.FIRMWARES, MADE_UP))
     usual = printed()[0]
     return usual.model_copy(update={"machine": usual.machine.model_copy(update={"dialect": "made_up"})})

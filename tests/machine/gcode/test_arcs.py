@@ -1,4 +1,4 @@
-"""Arcs: fitted to paths, written, read back, run by the simulated printer."""
+"""Arcs: fitted to paths, written, read back and executed by the simulated printer."""
 
 from math import cos, pi, sin
 
@@ -25,7 +25,7 @@ HEAD = "G21\nG90\nM83\nG92 X0 Y0 Z0 E0\n"
 
 
 def _turning(seed: int) -> Floats:
-    """A path of straight stretches and curves of all radii, sampled finely and roughly."""
+    """A path of straight stretches and curves of all radii, sampled finely and coarsely."""
     random = np.random.default_rng(seed)
     at, heading, points = np.zeros(2), 0.0, [np.zeros(2)]
     for _ in range(12):

@@ -1,4 +1,4 @@
-"""Blocks of a machine: written for its firmware, or refused with what a person should do."""
+"""G-code blocks of a machine: written for its firmware, or refused with advice."""
 
 import re
 from pathlib import Path
@@ -83,7 +83,7 @@ def test_axes_set_where_they_stand_after_a_restart_are_held_by_their_motors_firs
 
 
 def test_a_table_levelled_by_hand_is_held_by_its_motors_from_the_start() -> None:
-    """Marlin (planner.cpp) and RepRapFirmware switch a motor on by its first move, not by G92: the first part has no turn."""
+    """Marlin (planner.cpp) and RepRapFirmware energise a motor by its first move, not by G92: the first part has no turn."""
     starts = {name: filled_start(load(machine=name)) for name in shipped("machine")}
     levelled = {name: lines for name, lines in starts.items() if any(re.match(r"G92 [ABCUV]0", line) for line in lines)}
     assert sorted(levelled) == ["gen5x", "generic_ac", "open5x_prusa_i3", "open5x_voron0"]

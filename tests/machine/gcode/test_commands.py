@@ -1,4 +1,5 @@
-"""The table of commands: what heats is found in any firmware's spelling, and none of it is sent to a machine that stays cold."""
+"""The command table: heating commands are recognised in every firmware's spelling, and none is sent to a machine that stays
+cold."""
 
 import ast
 from inspect import getsource
@@ -70,7 +71,7 @@ def of(rows: dict[str, tuple[str, ...]]) -> pytest.MarkDecorator:
 
 
 def spellings(line: str) -> set[str]:
-    """The same command in capitals or not, without the blank behind its name, with a zero before its number, with a remark."""
+    """One command in upper or lower case, with or without a space after its name, with a leading zero and with a comment."""
     tight = line.replace(" ", "", 1) if line[1:2].isdigit() and line.count(" ") else line
     zero = f"{line[0]}0{line[1:]}" if line[1:2].isdigit() and line[0] in "GM" else line
     return {line, line.lower(), line.upper(), tight, tight.lower(), zero, f"  {line} ; M104 S0"}
@@ -98,7 +99,7 @@ def test_any_text_is_judged_and_one_that_begins_with_no_known_command_is_not_col
 
 
 def cold_homing(profile: Profile) -> list[list[str]]:
-    """How measuring begins, and how a machine is homed by hand."""
+    """The start of a measurement, and the homing of a machine by the user."""
     measuring = list(cold_start(calibration_pen(profile)))
     dialect = dialect_of(profile.machine)
     return [measuring] if dialect.homed_before else [measuring, homing_lines(filled_start(profile), dialect)]
@@ -116,7 +117,7 @@ def test_nothing_that_may_heat_is_sent_by_a_cold_procedure_on_any_shipped_machin
 @pytest.mark.parametrize("name", HOMED)
 def test_a_cold_procedure_stays_cold_whatever_heats_in_the_start_block(name: str) -> None:
     profile, dialect = load(name), dialect_of(load(name).machine)
-    heating = [line for line in HEATING[profile.machine.dialect] if "{" not in line]  # which is a placeholder in a block
+    heating = [line for line in HEATING[profile.machine.dialect] if "{" not in line]  # a placeholder in a block
     for spelled in sorted(spelled for line in heating for spelled in spellings(line)):
         for lines in cold_homing(with_start(profile, f"{spelled}\n{profile.machine.gcode.start}\n{spelled}")):
             assert {heat_in(sent, dialect) for sent in lines} == {Heat.COLD}

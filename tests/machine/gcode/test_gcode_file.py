@@ -1,4 +1,4 @@
-"""A G-code file, line by line or as its lines."""
+"""A G-code file, read line by line or as a list of lines."""
 
 from pathlib import Path
 

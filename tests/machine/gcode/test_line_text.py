@@ -1,7 +1,7 @@
-"""One reading of a line: what is sent is what was dry-run, whatever a firmware makes of a text.
+"""Lines of G-code: what is sent equals what was dry-run, however a firmware parses the text.
 
-The firmwares are transcribed here from their sources, independently of the program: Marlin's gcode/queue.cpp and parser.cpp,
-klippy/gcode.py, RepRapFirmware's GCodeBuffer/StringParser.cpp, and OctoPrint's strip_comment.
+The parsers of the firmwares are transcribed here from their sources, independently of the program: Marlin's gcode/queue.cpp and
+parser.cpp, klippy/gcode.py, RepRapFirmware's GCodeBuffer/StringParser.cpp, and OctoPrint's strip_comment.
 """
 
 import re
@@ -23,7 +23,7 @@ from profiles.errors import GcodeError, LocalProtocolError
 from profiles.machine import Machine
 from profiles.profile import load
 
-Read = tuple[str, dict[str, float]] | None  # a command's name and its words with numbers; None: nothing that could move
+Read = tuple[str, dict[str, float]] | None  # a command's name and its numeric words; None: nothing that could move
 NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)")
 
 
@@ -33,7 +33,7 @@ def marlin_float(text: str) -> float | None:
 
 
 def marlin(line: str) -> Read:
-    """GCodeParser::parse with FASTER_GCODE_PARSER: capitals only, any sign between words is skipped, the last word counts."""
+    """GCodeParser::parse with FASTER_GCODE_PARSER: upper case only, signs between words are skipped, the last word counts."""
     text = re.sub(r"^N[-+0-9.]+ *", "", line.lstrip(" ")).partition("*")[0]
     head = re.match(r"([GMT]) *([0-9]+)(?:\.([0-9]+))? *", text)
     if head is None or f"{head[1]}{int(head[2])}" in ("M23", "M28", "M30", "M117", "M118", "M928"):
@@ -55,7 +55,7 @@ def marlin(line: str) -> Read:
 
 
 def marlin_receives(data: bytes) -> Read:
-    """GCodeQueue: a `;` ends the line, a backslash hides what follows it, number and checksum must be right."""
+    """GCodeQueue: a `;` ends the line, a backslash escapes the next character, number and checksum must be right."""
     kept, escaped = "", False
     for c in data.decode("ascii").rstrip("\n"):
         if escaped:
@@ -76,15 +76,15 @@ def marlin_receives(data: bytes) -> Read:
 
 
 def octoprint(line: str) -> Read:
-    """What OctoPrint sends of a file's line to a Marlin: cut at a `;` that no backslash hides."""
+    """The bytes that OctoPrint sends to a Marlin for a line of a file: cut at a `;` that no backslash escapes."""
     kept = re.sub(r"\\(.)", r"\1", re.split(r"(?<!\\);", line, maxsplit=1)[0].strip())
-    while "\x08" in kept:  # each erases a character, as process_stream_char does
+    while "\x08" in kept:  # each deletes a character, as process_stream_char does
         kept = re.sub("[^\x08]?\x08", "", kept, count=1)
     return marlin(kept)
 
 
 def klipper(line: str) -> Read:
-    """GCodeDispatch._process_commands; a word that is no number is an error, which ends the print: nothing moves."""
+    """GCodeDispatch._process_commands; a word that is not a number is an error that ends the print: nothing moves."""
     parts = re.split(r"([A-Z_]+|[A-Z*])", line.strip().partition(";")[0].upper())
     name = "".join(parts[3:5] if "".join(parts[:2]) == "N" else parts[:3]).strip()
     words = {parts[k]: parts[k + 1].strip() for k in range(1, len(parts), 2)}
@@ -102,7 +102,8 @@ def klipper(line: str) -> Read:
 
 
 def reprapfirmware(line: str) -> list[Read]:
-    """StringParser: parentheses are no comments, a G or M outside quotes begins a command, the first of two words counts."""
+    """StringParser: it does not treat parentheses as comments, a G or M outside quotes begins a command, the first of two
+    words counts."""
     kept, quoted = "", False
     for c in line.strip():
         quoted ^= c == '"'
@@ -132,7 +133,7 @@ def reprapfirmware(line: str) -> list[Read]:
 
 
 class Playing:
-    """Where a machine stands: X Y Z tilt turn and the filament, by the commands that move it."""
+    """Position of a machine after its moves: X Y Z tilt turn and the filament."""
 
     def __init__(self, machine: Machine) -> None:
         self.letters = "".join(("XYZ", machine.tilt.letter, machine.turn.letter, "E"))
@@ -192,7 +193,7 @@ MACHINES = {
 
 
 def dry_run_moves(program: ParsedProgram) -> list[tuple[int, list[float]]]:
-    """The line of every move and where it ends; of an arc its last chord."""
+    """The line and the end of every move; for an arc, the end of its last chord."""
     last = np.flatnonzero(np.append(program.line[1:] != program.line[:-1], True)) if len(program.line) else []
     ends = np.column_stack([program.end, program.filament_mm])
     return [(int(program.line[k]), ends[k].tolist()) for k in last]
@@ -205,7 +206,7 @@ def assert_same_moves(done: list[tuple[int, list[float]]], program: ParsedProgra
 
 
 def sent(lines: list[str]) -> list[tuple[int, bytes]]:
-    """What goes down a serial line: the line's number in the program, and the bytes."""
+    """Data sent down a serial line: the line's number in the program, and the bytes."""
     commands = [(number, command_of(line, number)) for number, line in enumerate(lines, 1)]
     return [(number, frame(number, command)) for number, command in commands if command]
 
@@ -221,11 +222,11 @@ USUAL = (
     "G1 X10 Y-5.5 E1 F300", "G1 X 10 Y5", "G0 Z2 A30", "G2 I5 E.5", "G92 X3 E0", "G28 X Y", "G91", "G90", "M83", "M104 S2",
     "M117 a b", "G20",
 )  # fmt: skip
-PROBE = "G1 X7 Z1 E1 F600"  # tells by its end which modes hold
+PROBE = "G1 X7 Z1 E1 F600"  # its end shows which modes are in effect
 
 
 def put_between(words: list[str], scrap: str, place: int) -> str:
-    """A usual line with a scrap between two of its words."""
+    """A usual line with a scrap inserted between two of its words."""
     return " ".join([*words[: place % (len(words) + 1)], scrap, *words[place % (len(words) + 1) :]])
 
 

@@ -1,4 +1,4 @@
-"""Lines hold a text as its bytes and are the strings that went in."""
+"""Lines: a text stored as bytes that reads back as the original strings."""
 
 import pytest
 from hypothesis import given

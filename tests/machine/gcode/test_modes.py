@@ -1,4 +1,4 @@
-"""Modes: the dry run's reader, the host and the simulated printer read the same words as the same moves, in every dialect."""
+"""Modes: the dry run's reader, the host and the simulated printer interpret the same words as the same moves in every dialect."""
 
 from dataclasses import dataclass, field
 from math import inf
@@ -21,7 +21,7 @@ Place = list[float]
 
 
 def from_zero(machine: Machine) -> list[str]:
-    """A program's begin in which every axis that it can name stands at 0."""
+    """The beginning of a program that sets every axis it can name to 0."""
     return ["G21", "G90", "M82", "G92 " + " ".join(f"{letter}0" for letter in axes_of(machine).words), "G1 F600"]
 
 
@@ -84,7 +84,7 @@ def test_what_a_word_of_filament_pushes(read, dialect: str, text: str, pushed_mm
 
 @dataclass
 class Model:
-    """A firmware in a few lines: one number an axis, one line of each rule."""
+    """A minimal firmware: one number per axis, one line per rule."""
 
     machine: Machine
     at: dict[str, float] = field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""The lines of many moves, against Python's own way to write numbers."""
+"""The text of many moves, compared with Python's own number formatting."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ from mdp.mesh import Floats
 from mdp.pose import level
 from profiles.profile import load
 
-Point = tuple[float, float, float, float]  # X Y Z, and the filament of the step to it
+Point = tuple[float, float, float, float]  # X Y Z, and the filament of the step to that point
 MM = st.integers(-(10**8), 10**8).map(lambda thousandths: thousandths / 1000.0)
 ROWS = st.lists(st.tuples(st.sampled_from([0.0, 0.005, -1.5]), MM, st.sampled_from([0.2, -0.007]), MM), min_size=2, max_size=20)
 NO_TEXT = ("", "")
@@ -37,7 +37,7 @@ def path(rows: list[Point], does: int, speed: float = 20.0, most_mm_s: float = 1
 
 
 def by_python(rows: list[Point]) -> list[str]:
-    """A travel through points that are whole thousandths."""
+    """A travel through points in whole thousandths of a mm."""
     lines, tip, ending = [], (0.0, 0.0, 0.0), " F1200"
     for *point, _ in rows[1:]:
         changed = "".join(f" {'XYZ'[k]}{point[k]:.3f}" for k in range(3) if point[k] != tip[k])
@@ -75,7 +75,7 @@ def test_a_retraction_is_a_line_of_filament_alone() -> None:
 
 @pytest.mark.parametrize(("most_mm_s", "feed"), [(0.7, 1200), (0.6, 1143)])
 def test_a_stroke_that_rounding_shortens_is_slowed_only_where_its_filament_is_too_fast(most_mm_s: float, feed: int) -> None:
-    """0.0124 mm with 0.03 mm of filament a mm are written as 0.012 mm: 20 mm/s ask for 0.62 mm/s of filament, not 0.6."""
+    """0.0124 mm with 0.03 mm of filament per mm is written as 0.012 mm: 20 mm/s need 0.62 mm/s of filament, not 0.6."""
     rows = [(0.0, 0.0, 0.0, 0.0), (0.0124, 0.0, 0.0, 0.03 * 0.0124)]
     (line,) = pen().paths(path(rows, PUSHING, 20.0, most_mm_s), texts(*NO_TEXT)).splitlines()
     assert line.split(" F")[1] == str(feed)
@@ -101,7 +101,7 @@ def test_a_path_of_which_nothing_is_written_leaves_the_speed_that_the_firmware_k
 @pytest.mark.parametrize("relative", [True, False])
 @given(st.lists(st.floats(-0.4, 0.4), min_size=2, max_size=20))
 def test_filament_rounded_in_one_call_is_made_up_for_in_the_next(relative: bool, pushed: list[float]) -> None:
-    """However the paths are handed over, the sum of what is written is that of what was pushed, to the last digit."""
+    """The sum of the written amounts equals the sum pushed, to the last digit, however the paths are split over calls."""
     writes, sums = pen("E", relative), 0.0
     for k, e in enumerate(pushed):
         rows = [(float(k), 0.0, 0.0, 0.0), (float(k + 1), 0.0, 0.0, e)]

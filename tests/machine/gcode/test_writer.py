@@ -72,7 +72,7 @@ def test_no_step_is_written_denser_than_its_stroke(steps: list[float], heading_d
     stroke = Stroke(Kind.SKIN, np.column_stack([x, y, np.full(len(x), 0.2)]), 0.4 * np.array(steps), 100.0, 0.4)
     parsed = parse_gcode(write_gcode(program_of("p", (stroke,)), load()), load().machine)
     length = np.linalg.norm(parsed.end - parsed.start, axis=1)
-    filament_mm_s = (parsed.e_mm - 1e-5)[1:] / length[1:] * parsed.feed[1:] / 60.0  # the first comes from where the text begins
+    filament_mm_s = (parsed.e_mm - 1e-5)[1:] / length[1:] * parsed.feed[1:] / 60.0  # the first one starts where the text begins
     assert filament_mm_s.max(initial=0.0) <= 40.0 * 1.004 + 0.01
 
 

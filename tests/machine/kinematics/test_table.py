@@ -89,7 +89,7 @@ def test_every_pose_of_any_chain_brings_its_direction_upright(machine: Machine, 
 
 def test_a_direction_just_beyond_what_the_axes_reach_has_no_pose() -> None:
     machine = _chain(((1.0, 6.103515625e-05, 0.0), (0.0, 0.5, 1.0)), ((0.0, 0.0, 0.0),) * 3, (-1, -1), (0.0, 0.0))
-    assert poses(machine, unit((0.0, 0.5, 1.0))) == []  # 3e-5 short of upright at the best
+    assert poses(machine, unit((0.0, 0.5, 1.0))) == []  # at best 3e-5 from upright
 
 
 @given(CHAINS, st.floats(-170, 170), st.floats(-170, 170))
@@ -98,7 +98,7 @@ def test_the_pose_that_a_direction_was_made_with_is_among_its_poses(machine: Mac
     direction = rotation(machine, pose).T @ UP
     turned = axis_rotation(machine.turn, pose.turn_deg) @ direction
     corner = abs(np.linalg.det([unit(machine.turn.axis), unit(machine.tilt.axis), turned]))
-    assume(corner > 0.02)  # nearer to where both branches meet a digit of the direction is many of the angles
+    assume(corner > 0.02)  # near the point where both branches meet, one digit of the direction changes the angles a lot
     apart = [max(abs(p.tilt_deg - pose.tilt_deg), abs(p.turn_deg - pose.turn_deg)) for p in poses(machine, direction)]
     assert min(apart) < 1e-9
 

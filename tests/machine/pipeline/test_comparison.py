@@ -1,4 +1,4 @@
-"""A print in parts beside the same model in one part."""
+"""A print in parts compared with the same model in one part."""
 
 from functools import cache
 
@@ -75,7 +75,7 @@ def test_marks_and_modifiers_hold_for_the_model_in_one_part_too_as_it_lies() -> 
 
 def test_copies_are_laid_down_each_for_itself() -> None:
     profile = load(settings=COARSE)
-    cross = Manifold.cube((8, 8, 30), True) + Manifold.cube((30, 8, 8), True)  # nothing of it overhangs where it lies on its side
+    cross = Manifold.cube((8, 8, 30), True) + Manifold.cube((30, 8, 8), True)  # no overhang when it lies on its side
     single = decompose(standing(cross), "cross", profile, SearchRequest(parts=1))
     many, plated = on_one_plate([single] * 2, profile)
     one, two = in_one_part(single, profile)[1], in_one_part(many, plated)[1]
@@ -89,7 +89,7 @@ def test_stairs_of_a_model_in_one_piece_are_those_of_its_slanted_faces_searched_
     wedge, profile = mesh_of(Manifold.hull_points(sides)), load(settings=COARSE)
     searched = in_parts(build(decompose(wedge, "wedge", profile), profile), profile)
     up = straight_up(alone(wedge, 0.0), profile)
-    # 10 x 10 mm of plate lie under the slanted face, by 0.1 for layers of 0.2 mm
+    # the slanted face covers 10 x 10 mm of the plate, times 0.1 for layers of 0.2 mm
     assert searched.stairs_mm2 == pytest.approx(20.0)
     assert [row["stairs_mm2"] for row in alternatives_json((searched, up, up))] == pytest.approx([20.0] * 3)
 

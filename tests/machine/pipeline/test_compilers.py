@@ -1,4 +1,4 @@
-"""The processes that compile the kernels of a first run, and the command that waits for them."""
+"""The processes that compile kernels in a first run, and the command that waits for them."""
 
 import sys
 
@@ -11,7 +11,7 @@ from mdp.kernels.cache import mark
 
 @pytest.fixture
 def unmarked(monkeypatch, tmp_path):
-    """Nothing is said to be cached, and what is noted is noted elsewhere."""
+    """Nothing counts as cached, and records are written elsewhere."""
     monkeypatch.setattr("mdp.kernels.cache.mark", lambda bundle: tmp_path / bundle)
     return tmp_path
 

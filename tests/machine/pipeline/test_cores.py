@@ -1,4 +1,5 @@
-"""Number of cores: the chain from the search to the G-code and the viewer page writes the same bytes on one and on three."""
+"""Number of cores: the pipeline from the search to the G-code and the viewer page writes the same bytes on one and three
+cores."""
 
 import subprocess
 import sys

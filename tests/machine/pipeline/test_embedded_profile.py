@@ -1,4 +1,4 @@
-"""The foot of a file holds the profile it was made with, whole."""
+"""The end of a G-code file contains the complete profile."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""No command writes over what it reads, nor one file twice."""
+"""A command never overwrites a file that it reads, and never writes one file twice."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""What large arrays have taken goes back to the system."""
+"""The memory of large arrays is returned to the operating system."""
 
 import ctypes
 

@@ -1,4 +1,4 @@
-"""How a model was laid down is told with what that is better by, and whether the plate holds it."""
+"""Messages about the chosen orientation: its advantage, and whether the model holds on the plate."""
 
 from dataclasses import replace
 
@@ -57,4 +57,4 @@ def test_a_model_that_is_not_turned_is_tested_on_the_plate() -> None:
     cone = m3.Manifold.cylinder(40.0, 0.01, 12.0, 64)
     assert len(standing_in_words(mesh_of(cone), load())) == 1
     assert standing_in_words(mesh_of(cone.rotate((180.0, 0.0, 0.0)).translate((0.0, 0.0, 40.0))), load()) == ()
-    assert standing_in_words(mesh_of(cone), load(settings=["search.pedestal_mm=5"]))  # which holds no more than a plate
+    assert standing_in_words(mesh_of(cone), load(settings=["search.pedestal_mm=5"]))  # a pedestal holds no more than a plate

@@ -1,4 +1,4 @@
-"""Pictures: PNG bytes, pixels against geometry, and what the two sheets show."""
+"""Pictures: PNG bytes, pixels against geometry, and the contents of the two sheets."""
 
 import struct
 from base64 import b64decode
@@ -48,14 +48,14 @@ def example() -> Decomposition:
 
 
 def decoded(content: bytes) -> NDArray[np.uint8]:
-    """The pixels of a PNG file, which must be RGB without losses."""
+    """The pixels of a PNG file, which must be lossless RGB."""
     with Pillow.open(BytesIO(content)) as picture:
         assert (picture.format, picture.mode) == ("PNG", "RGB")
         return np.asarray(picture)
 
 
 def share_like(image: NDArray[np.uint8], hue: NDArray[np.float64]) -> float:
-    """Share of pixels whose colour points the way of `hue`, whatever the light."""
+    """Share of pixels with the hue of a colour, in any light."""
     pixels = image.reshape(-1, 3).astype(float)
     chroma, wanted = pixels - pixels.mean(axis=1, keepdims=True), hue - hue.mean()
     lengths = np.linalg.norm(chroma, axis=1)
@@ -146,7 +146,7 @@ def test_the_contact_sheet_has_a_frame_for_every_part_with_that_part_in_colour()
 
 
 def ink(image: NDArray[np.uint8]) -> int:
-    """Pixels that are as dark as letters, and grey."""
+    """Pixels that are grey and as dark as letters."""
     return int(((image.max(axis=2) < 200) & (np.ptp(image.astype(int), axis=2) == 0)).sum())
 
 

@@ -1,4 +1,4 @@
-"""The whole way from a model file to the plastic of a simulated printer."""
+"""The whole pipeline, from a model file to the plastic of a simulated printer."""
 
 from pathlib import Path
 
@@ -22,10 +22,10 @@ SHARED = Path(__file__).parents[3].parent / "shared" / "models"
 RUNS = [("generic_ac", "demo:figure"), ("generic_ac", "demo:lattice"), ("fractal5pro", "demo:tree")]
 if SHARED.exists():
     RUNS += [("generic_ac", str(SHARED / "bracket.3mf")), ("fractal5pro", str(SHARED / "kitten.off"))]
-WHOLE = "bracket.3mf"  # no cut makes more of it safe
+WHOLE = "bracket.3mf"  # no cut reduces its risky area
 QUICK = ["search.directions=40", "search.beam_width=1", "process.layer_height_mm=0.3", "process.first_layer_height_mm=0.3"]
-QUICK += ["process.scale=0.25", "process.walls=1", "process.infill_density=0.05"]  # a fortieth of the lines, the same shapes
-QUICK += ["search.seam_mm=0", "search.cut_mm2=0"]  # else nobody would cut what is so small
+QUICK += ["process.scale=0.25", "process.walls=1", "process.infill_density=0.05"]  # a fortieth of the lines in the same shapes
+QUICK += ["search.seam_mm=0", "search.cut_mm2=0"]  # otherwise a model this small would not be cut
 
 
 def _built(model: str, machine: str) -> Program:
@@ -53,20 +53,20 @@ def test_the_simulated_printer_lays_the_plastic_where_the_model_is(machine: str,
 
 @pytest.mark.slow
 def test_the_plastic_is_what_the_sliced_paths_say() -> None:
-    profile = load(settings=[*QUICK, "material.prime_extra_mm=0"])  # what is pushed after a turn is no path's
+    profile = load(settings=[*QUICK, "material.prime_extra_mm=0"])  # filament pushed after a turn belongs to no path
     decomposition = decompose_model(ModelRequest("demo:tree", profile, orient=False), to_build=True).decomposition
-    assert all(row.time_s is None for row in decomposition.front)  # without seams support alone counts: no part is estimated
+    assert all(row.time_s is None for row in decomposition.front)  # without seams only support counts: no part is estimated
     planned = sum(part.volume_mm3 for part in slice_parts(decomposition.parts, profile))
     built = build(decomposition, profile)
     run = built.run
     assert built.decomposition is not None
     assert [row.time_s for row in built.decomposition.front if row.chosen] == [run.time_s]
-    of_parts = run.program.part[run.segment_row] > 0  # not the purge line
+    of_parts = run.program.part[run.segment_row] > 0  # without the purge line
     assert run.segment_mm3[of_parts].sum() == pytest.approx(planned, rel=1e-3)
 
 
 def _arms(*settings: str) -> Program:
-    """An arm of 12 mm leans out of a block to the right, one of 4 mm to the left."""
+    """An arm 12 mm wide leans out of a block to the right, one 4 mm wide to the left."""
     block = m3.Manifold.cube((30.0, 16.0, 12.0), True).translate((0.0, 0.0, 6.0))
     arms = [m3.Manifold.cube((wide, wide, 26.0), True).translate((0.0, 0.0, 13.0)) for wide in (12.0, 4.0)]
     right, left = (arm.rotate((0.0, lean, 0.0)).translate((0.0, 0.0, 9.0)) for arm, lean in zip(arms, (40.0, -40.0), strict=True))

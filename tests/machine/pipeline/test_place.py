@@ -1,4 +1,4 @@
-"""Place: a model stands elsewhere on the plate, with the same parts, and all that comes after the search is there, too."""
+"""Place: a model moved on the plate keeps its parts, and everything computed after the search moves with it."""
 
 from dataclasses import replace
 from functools import cache
@@ -87,7 +87,7 @@ def test_a_place_over_the_edge_is_refused_in_the_sentence_of_export() -> None:
 
 
 def test_one_piece_to_compare_with_stands_at_the_same_place() -> None:
-    profile = at(60, 0)  # at twice as much it would stand over the edge
+    profile = at(60, 0)  # at twice the offset it would extend over the edge
     ways = compare_with_one_part(build(in_arms(profile), profile), profile)
     assert [way.message for way in ways if "edge" in way.message] == []
     assert all(way.time_s is not None for way in ways)

@@ -1,4 +1,4 @@
-"""Plate: models stand apart, are printed together or one after the other, and what does not fit is refused."""
+"""Plate: models keep their distance, are printed together or one after the other, and are refused if they do not fit."""
 
 from dataclasses import replace
 from itertools import combinations
@@ -61,7 +61,7 @@ def test_copies_stand_in_rows_near_the_middle(count: int, reach_mm: float) -> No
 def test_as_many_copies_stand_on_an_oblong_plate_as_have_room_in_rows() -> None:
     machine = load(settings=["machine.table.size_mm=[196, 99]"]).machine
     places = places_on_plate((20.0, 20.0), 5.0, 1000, machine)
-    assert len(places) == int((196 - 4 + 5) / 25) * int((99 - 4 + 5) / 25)  # 2 mm are kept free to every edge
+    assert len(places) == int((196 - 4 + 5) / 25) * int((99 - 4 + 5) / 25)  # 2 mm stay free at every edge
 
 
 def test_copies_on_a_round_plate_keep_to_its_edge_and_apart() -> None:
@@ -99,7 +99,7 @@ def test_copies_around_a_clip_are_printed_without_a_collision_on_the_ways_betwee
     program = build(decomposition, profile)
     assert [finding.message for finding in program.run.errors] == []
     travels = program.run.program.end[:, 2][program.run.program.end[:, 2] > 11.0]
-    assert len(travels) > 0  # it rises to cross the clip
+    assert len(travels) > 0  # the tip rises to cross the clip
 
 
 def test_models_of_several_sizes_stand_clear_of_a_clip() -> None:
@@ -262,13 +262,13 @@ def large_and_small(*settings: str) -> tuple[Decomposition, Profile]:
 
 
 def boxes_of(print_: Decomposition) -> list[shapely.Geometry]:
-    """The rectangle that each model of a plate covers, by its connected vertices."""
+    """The bounding rectangle of each model on a plate, by its connected vertices."""
     label = vertex_components(len(print_.mesh.vertices), print_.mesh.faces)
     return [shapely.MultiPoint(print_.mesh.vertices[label == k, :2]).envelope for k in np.unique(label)]
 
 
 def beads_of(program: Program) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Part and layer of every bead but the purge line's, and whether it belongs to the small box, which stands in front."""
+    """Part and layer of every bead except the purge line's, and whether it belongs to the small box in front."""
     run = program.run
     which = np.flatnonzero(run.program.part[run.segment_row] > 0)
     rows, y = run.segment_row[which], run.deposited.segments(which)[:, :, 1].mean(axis=1)
@@ -291,7 +291,7 @@ def test_layer_by_layer_both_models_lie_in_every_layer_that_both_reach() -> None
     assert sorted(set(layer[is_small].tolist())) == [1, 2, 3, 4]  # 1.2 mm in layers of 0.3
     assert sorted(set(layer[~is_small].tolist())) == [1, 2, 3, 4, 5, 6, 7]
     box_mm = np.array(summary(program.run)["bounds_mm"])
-    assert box_mm[:, 1] == pytest.approx([-17.5, 17.5], abs=0.25)  # half a line inside
+    assert box_mm[:, 1] == pytest.approx([-17.5, 17.5], abs=0.25)  # the bead's centreline is half a line width inside
     assert [finding.code for finding in program.run.findings] == ["uncalibrated"]
 
 
@@ -320,7 +320,7 @@ def test_where_the_head_would_meet_a_tall_model_the_next_one_stands_farther_away
     for settings in ((), ("process.complete_objects=true",)):
         print_, _ = on_one_plate(models, plate("process.skirt_loops=0", *settings))
         gaps.append(boxes_of(print_)[0].distance(boxes_of(print_)[1]))
-    assert plate().machine.head.silhouette_mm[-2:] == [(11.5, 4.5), (15.0, 16.0)]  # 13.8 mm wide where the first one ends
+    assert plate().machine.head.silhouette_mm[-2:] == [(11.5, 4.5), (15.0, 16.0)]  # 13.8 mm wide at a height of 12 mm
     assert gaps == pytest.approx([5.0, 17.5])  # a multiple of 2.5 mm
 
 
@@ -335,7 +335,7 @@ def test_models_that_the_head_cannot_pass_are_refused_with_what_goes() -> None:
 
 def test_models_that_would_fit_but_for_the_head_are_refused_with_that_cause_even_where_no_free_place_is_left() -> None:
     models = [decomposed(whole(box(60 + k, 60, 70 + k)), name=f"box {k}") for k in range(3)]
-    on_one_plate(models, plate())  # layer by layer there is room for all
+    on_one_plate(models, plate())  # printed layer by layer, all models fit
     with pytest.raises(PlanError) as refused:
         on_one_plate(models, plate("process.complete_objects=true"))
     place, _, cause = str(refused.value).partition(" that the head reaches without hitting them: ")

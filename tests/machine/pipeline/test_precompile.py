@@ -1,4 +1,4 @@
-"""The process that compiles beside the work does not outlive it."""
+"""A process that compiles in the background does not outlive its command."""
 
 import pickle
 from pathlib import Path

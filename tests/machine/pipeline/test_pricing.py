@@ -1,4 +1,4 @@
-"""Parts have a price where they can be sliced, and the search chooses by it."""
+"""Parts that can be sliced have a price, and the search chooses by it."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""A profile of one's own: what is written reads back to the same profile, whatever was changed."""
+"""User profiles: a profile that is written reads back equal, whatever was changed."""
 
 from pathlib import Path
 
@@ -8,17 +8,17 @@ from machine.cli.cli import main
 from machine.pipeline.profile_file import profile_text
 from profiles.profile import check_file, known, load_one
 
-BLOCK = 'machine.gcode.start="G28\\nM117 \'ready\' \\"{nozzle_c}\\" \\\\\\n"'  # as a terminal has it
+BLOCK = 'machine.gcode.start="G28\\nM117 \'ready\' \\"{nozzle_c}\\" \\\\\\n"'  # as typed in a terminal
 
 
 @pytest.mark.parametrize(
     ("name", "settings"),
     [
         ("gen5x", ["machine.tilt.limits_deg=[-30, 30]", BLOCK, "machine.head.boxes=[]", 'machine.name="42"']),
-        ("generic_ac", ['machine.sources={"machine.x" = "measured"}', "machine.uncalibrated=[]"]),  # rows that were inherited go
+        ("generic_ac", ['machine.sources={"machine.x" = "measured"}', "machine.uncalibrated=[]"]),  # inherited rows are removed
         ("generic_ac", ["machine.shape=fixed"]),
         ("three_axis", ["machine.sources={}"]),
-        ("three_axis", ["machine.table.radius_mm=90", "machine.table.size_mm="]),  # which has a value there
+        ("three_axis", ["machine.table.radius_mm=90", "machine.table.size_mm="]),  # which has a value in this profile
         ("tpu", ["material.pressure_advance=0.1"]),
         ("fine", ["process.walls=5", "search.beam_width=9", "process.rotate_deg=[0, 90, 0]"]),
     ],

@@ -1,4 +1,4 @@
-"""A project file: what it holds prints as what it was saved from, other slicers read it as a model, damage is refused."""
+"""Project files: a project prints like its source, other slicers read it as a model, and damaged files are refused."""
 
 import io
 import json
@@ -67,7 +67,7 @@ def run(*words: str) -> None:
 
 @pytest.fixture(scope="module")
 def saved(tmp_path_factory: pytest.TempPathFactory) -> bytes:
-    """A project of one part that stands as it is."""
+    """A project of one part in its given orientation."""
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(tmp_path_factory.mktemp("saved"))
         Path("tee.stl").write_bytes(stl(tee()))
@@ -77,7 +77,7 @@ def saved(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 
 @pytest.fixture
 def project(folder: Path, saved: bytes) -> Path:
-    """It lies beside the other files of the folder."""
+    """The project is saved beside the other files of the folder."""
     Path("tee.3mf").write_bytes(saved)
     return folder
 
@@ -173,7 +173,7 @@ def test_options_that_a_project_leaves_no_room_for_are_refused_by_its_name(
 
 
 def changed(path: Path, name: str, content: bytes | None) -> None:
-    """Writes a project anew with other content of one of its files; None: without it."""
+    """Write a project again with other content of one of its files; None: without that file."""
     with zipfile.ZipFile(path) as archive:
         files = {entry: archive.read(entry) for entry in archive.namelist()}
     files[name] = content if content is not None else b""

@@ -1,4 +1,4 @@
-"""A raft under whole prints: all parts are lifted alike, the dry run accepts it and still finds what is wrong with it."""
+"""A raft under a whole print: all parts are lifted equally, and the dry run accepts it but still finds its faults."""
 
 import re
 from collections.abc import Callable
@@ -136,7 +136,7 @@ def test_a_model_that_only_its_raft_lifts_out_of_reach_is_refused() -> None:
 
 
 def _reach_mm(mesh: Mesh, profile: Profile) -> float:
-    """How far above a part of no height the tip is, in the machine's Z."""
+    """Height of the tip above a part of zero height, in the machine's Z."""
     with pytest.raises(MoveError) as error:
         check_parts([one_piece(Mesh(mesh.vertices * [1.0, 1.0, 1000.0], mesh.faces), profile.machine)], profile)
     reached = re.search(r"reaches Z (-?[0-9.]+) mm", str(error.value))

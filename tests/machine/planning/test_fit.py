@@ -1,4 +1,4 @@
-"""Fit: what a machine has no room for is refused before it is sliced."""
+"""Fit: a model that is too large for the machine is refused before slicing."""
 
 from contextlib import nullcontext
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Ways of the tip within a limb, to it and from it, beside what stands higher."""
+"""Travels within a limb, to it and from it, beside higher structures."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ TOP_MM = 24.0  # of the posts
 
 
 def _short(z_mm: float) -> Profile:
-    """The profile of the sliced models with a Z axis that ends there."""
+    """The profile of the sliced models with a Z axis that ends at z_mm."""
     profile = sliced("outer posts")[0]
     z = profile.machine.z.model_copy(update={"limits_mm": (-80.0, z_mm)})
     return profile.model_copy(update={"machine": profile.machine.model_copy(update={"z": z})})
@@ -39,7 +39,7 @@ def test_the_way_from_one_limb_to_the_other_leads_over_the_post_between_them() -
     starts, ends = moved_part(printed("outer posts")[0], 2)
     crosses = starts[:, 0] * ends[:, 0] < 0.0
     least = np.minimum(starts[crosses, 2], ends[crosses, 2])
-    assert crosses.sum() >= 80  # one of the 90 layers at most ends where the next one begins
+    assert crosses.sum() >= 80  # at most one of the 90 layers ends where the next one begins
     assert least.min() >= TOP_MM + load().machine.clearance_mm
 
 
@@ -66,7 +66,7 @@ def test_a_z_axis_too_short_for_the_way_over_what_stands_is_told() -> None:
 
 
 def _without_turns(profile: Profile) -> Profile:
-    """No height is kept while the table turns, or to what is printed before."""
+    """A profile that keeps no height while the table turns, nor above earlier parts."""
     return profile.model_copy(update={"machine": profile.machine.model_copy(update={"lift_mm": 0.0})})
 
 

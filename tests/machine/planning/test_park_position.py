@@ -1,4 +1,4 @@
-"""When a print is done the tip stands pulled back, above everything and beside the print, on every machine."""
+"""At the end of a print the tip is retracted, above and beside the print, on every machine."""
 
 import manifold3d as m3
 import numpy as np
@@ -23,11 +23,11 @@ from tests.machine.hand import part, squares
 from tests.shapes import from_manifold
 
 MACHINES = sorted(shipped("machine"))
-OUTLINE_MM = BESIDE_MM - 2.0  # of the middles of the beads
+OUTLINE_MM = BESIDE_MM - 2.0  # of the centrelines of the beads
 
 
 def program_of(machine: str, upright: bool) -> tuple[Profile, MachineProgram]:
-    """A post 30 mm high; unless it is upright its top is cut off at a slant and printed with the table tilted."""
+    """A post 30 mm high; unless it is upright, its top is cut off at a slant and printed with the table tilted."""
     profile = load(machine=machine, settings=["machine.purge_mm=0"])
     post, slant = m3.Manifold.cube((10.0, 10.0, 30.0)).translate((-5.0, -5.0, 0.0)), np.radians(20.0)
     plane = Plane(np.array([np.sin(slant), 0.0, np.cos(slant)]), 22.0)

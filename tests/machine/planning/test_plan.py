@@ -78,7 +78,7 @@ def test_the_table_ends_level_for_the_next_homing() -> None:
 
 
 def _cramped(z_mm: float, xy_mm: float, plate_mm: float) -> Profile:
-    """The generic machine with a short Z axis, X and Y of +-xy_mm and a plate of that radius."""
+    """The generic machine with a short Z axis, X and Y limits of ±xy_mm and a plate of that radius."""
     machine = load().machine
     z = machine.z.model_copy(update={"limits_mm": (-80.0, z_mm)})
     x = machine.x.model_copy(update={"limits_mm": (-xy_mm, xy_mm)})
@@ -137,7 +137,7 @@ def test_strokes_are_slowed_to_what_the_extruder_pushes() -> None:
     speeds = {move.speed_mm_s for move in moves_of(program) if isinstance(move, Stroke)}
     assert max(speeds) * ((0.45 - 0.2) * 0.2 + pi * 0.01) == pytest.approx(
         0.5 / 1.004 * pi * 1.75**2 / 4
-    )  # rounded ends make short strokes richer
+    )  # rounded ends add volume to short strokes
 
 
 def test_layers_are_numbered_from_one_in_every_part() -> None:

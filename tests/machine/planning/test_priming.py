@@ -1,4 +1,4 @@
-"""What oozed while the table turned is made up for inside, along a stroke, within what the hot end melts."""
+"""Filament that oozed during a table turn is replaced inside the part, along a stroke, within the hot end's melt rate."""
 
 from math import pi
 
@@ -14,11 +14,11 @@ from slicer.slice import begin_inside, slice_part
 from tests.shapes import box
 from tests.slicer.hand import BARE, cut
 
-PER_MM = 0.033  # filament of a usual bead
+PER_MM = 0.033  # filament of a usual bead per mm
 
 
 def _strokes(*steps_mm: tuple[float, ...], speed: float = 25.0, flow: float = 1.0) -> Moves:
-    """Strokes along X with steps of some lengths."""
+    """Strokes along X with steps of given lengths."""
     steps = [np.array([0.0, *lengths]) for lengths in steps_mm]
     ways = [np.column_stack([np.cumsum(row), np.zeros((len(row), 2)), flow * PER_MM * row]) for row in steps]
     return Moves(np.concatenate(ways), np.array([[0.0, len(row), speed, 0.45, np.nan, np.inf] for row in steps]))
@@ -36,7 +36,7 @@ def test_the_filament_is_spread_over_the_first_stretch_and_then_all_is_as_usual(
     assert strokes.ways[:, 3] == pytest.approx([0.0, 5 * thicker, 15 * thicker, 30 * PER_MM, 0.0, 40 * PER_MM])
 
 
-@pytest.mark.parametrize("flow", [1.0, 1.24])  # outer beads that nothing covers bulge, the more so the narrower they are
+@pytest.mark.parametrize("flow", [1.0, 1.24])  # outer beads with nothing over them bulge, and more so if they are narrow
 def test_no_stroke_takes_more_than_half_too_much_and_the_next_one_takes_the_rest(flow: float) -> None:
     strokes = _strokes((5.0,), (40.0,), flow=flow)
     assert run_in(strokes, _layer(Kind.INFILL, Kind.INFILL), 0.4, load()) == pytest.approx(0.4)

@@ -1,4 +1,4 @@
-"""Retractions: wipe, lift, prime, coast; what is pulled back is pushed forward."""
+"""Retractions: wipe, lift, prime and coast; filament that is pulled back is pushed forward again."""
 
 from itertools import pairwise
 
@@ -34,7 +34,7 @@ def _towers(*settings: str) -> tuple[MachineProgram, Profile]:
 
 
 def _filament(program: MachineProgram) -> tuple[float, float]:
-    """Pulled back and pushed forward outside strokes."""
+    """Filament pulled back and pushed forward outside strokes."""
     pulled = sum(float(np.sum(m.filament_mm)) for m in moves_of(program) if isinstance(m, Wipe))
     amounts = [m.filament_mm for m in moves_of(program) if isinstance(m, Retract)]
     return pulled + sum(a for a in amounts if a > 0), -sum(a for a in amounts if a < 0)
@@ -44,7 +44,7 @@ def _filament(program: MachineProgram) -> tuple[float, float]:
 def test_what_is_pulled_back_is_pushed_forward_again(wipe: float) -> None:
     pulled, pushed = _filament(_towers(f"material.wipe_mm={wipe}")[0])
     assert pulled > 10
-    assert pulled == pytest.approx(pushed + 0.8)  # the print ends pulled back
+    assert pulled == pytest.approx(pushed + 0.8)  # the print ends retracted
 
 
 def test_extra_prime_is_pushed_after_every_retraction() -> None:
@@ -68,7 +68,7 @@ def test_a_wipe_goes_over_the_path_just_printed_at_the_pace_of_the_filament() ->
 def test_a_retracted_travel_crosses_lifted_and_comes_down_at_its_end() -> None:
     layer, checked, pulled = BeginLayer(1, 1, 0.0, 0.2, 0.0), 0, False
     moves = moves_of(_towers("process.lift_mm=0.4")[0])
-    last = max(index for index, move in enumerate(moves) if isinstance(move, Stroke))  # then the tip goes aside
+    last = max(index for index, move in enumerate(moves) if isinstance(move, Stroke))  # after it the tip parks
     for before, move in pairwise(moves[:last]):
         layer = move if isinstance(move, BeginLayer) else layer
         pulled = isinstance(move, Wipe) or (pulled and not isinstance(move, Stroke))
@@ -81,9 +81,7 @@ def test_a_retracted_travel_crosses_lifted_and_comes_down_at_its_end() -> None:
 
 def test_ways_across_have_the_travel_speed_and_those_straight_up_and_down_the_lift_speed() -> None:
     words = ("process.lift_mm=0.4", "process.lift_speed_mm_s=5", "process.travel_speed_mm_s=120")
-    travels = [move for move in moves_of(_towers(*words)[0]) if isinstance(move, Travel)][
-        2:
-    ]  # two stand for the way to the start
+    travels = [move for move in moves_of(_towers(*words)[0]) if isinstance(move, Travel)][2:]  # the first two lead to the start
     upright = {move.speed_mm_s for move in travels if not np.ptp(move.points_mm[:, :2], axis=0).any()}
     level = {move.speed_mm_s for move in travels if not np.ptp(move.points_mm[:, 2])}
     assert (upright, level) == ({5.0}, {120.0})

@@ -1,4 +1,4 @@
-"""Routes around a turn of the table against brute force: points all over head, table, cradle and print, pose by pose."""
+"""Routes around a table turn against brute force: sample points on head, table, cradle and print in every pose."""
 
 from functools import cache
 from itertools import pairwise
@@ -37,7 +37,7 @@ def _machine(name: str) -> Machine:
 
 
 def _filled(least, most, step: float = 6.0) -> np.ndarray:
-    """Points over the six faces of a box."""
+    """Sample points on the six faces of a box."""
     axes = [np.linspace(a, b, max(2, int((b - a) / step) + 1)) for a, b in zip(least, most, strict=True)]
     grid = np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1).T
     return grid[np.any((grid == np.array(least)) | (grid == np.array(most)), axis=1)]
@@ -45,7 +45,7 @@ def _filled(least, most, step: float = 6.0) -> np.ndarray:
 
 @cache
 def _head(name: str) -> np.ndarray:
-    """Points all over the head, tip at the origin: the silhouette's rings up to 150 mm, the boxes."""
+    """Sample points on the head, tip at the origin: the silhouette's rings up to 150 mm, and the boxes."""
     machine = _machine(name)
     around = np.linspace(0, 2 * np.pi, 24, endpoint=False)
     profile = [*machine.head.silhouette_mm, *((machine.head.silhouette_mm[-1][0], z) for z in np.linspace(20, 150, 40))]
@@ -54,7 +54,7 @@ def _head(name: str) -> np.ndarray:
 
 
 def _turned(machine: Machine, pose: Pose) -> np.ndarray:
-    """Points all over what turns, in the frame of X Y Z."""
+    """Sample points on the bodies that turn, in the frame of X Y Z."""
     table = machine.table
     if table.size_mm is not None:
         x, y = (size / 2 for size in table.size_mm)
@@ -68,7 +68,7 @@ def _turned(machine: Machine, pose: Pose) -> np.ndarray:
 
 
 def _least_distance(name: str, tips: np.ndarray) -> np.ndarray:
-    """(n,) least distance of the head at (n, 3) tips from all that turns, over the poses of the turn."""
+    """(n,) least distance of the head at (n, 3) tips from the bodies that turn, over the poses of the turn."""
     machine = _machine(name)
     least = np.full(len(tips), np.inf)
     poses = poses_between(level(machine), TURN)

@@ -1,4 +1,4 @@
-"""Stops: the print waits before a layer, the tip aside, in the words of the firmware; what is not there is refused."""
+"""Stops: the print pauses before a layer with the tip aside, in the firmware's words; a layer that does not exist is refused."""
 
 import pytest
 

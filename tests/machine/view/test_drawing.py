@@ -1,4 +1,4 @@
-"""Drawing in a real browser: a coarse picture first, the share that is drawn, a panel of another width, linked sliders."""
+"""Drawing in a browser: a coarse picture first, progress, resized panels, linked sliders."""
 
 from functools import cache
 from pathlib import Path
@@ -25,7 +25,7 @@ RESIZED_AFTER = """((frames) => {
   document.getElementById('position').dispatchEvent(new Event('input'));
   setTimeout(() => { window.requestAnimationFrame = real; }, 1000);
 })"""
-# Moves the slider in the midst of every piece of a picture, and keeps what is said of it.
+# Moves the slider during every piece of a picture, and records the notices.
 SLID_WHILE_DRAWN = """(() => {
   const root = document.documentElement, [slider, notice] = ['position', 'notice'].map((id) => document.getElementById(id));
   const ends = [slider.max, 3000];
@@ -43,14 +43,14 @@ SLID_WHILE_DRAWN = """(() => {
 
 @cache
 def long_print(rows: int = 6000) -> bytes:
-    """The page of a file of many short strokes."""
+    """The viewer page of a file of many short strokes."""
     strokes = [f"G1 X{k % 40} Y{k // 1000 % 30 + k % 2} E{10 + k * 0.01:.2f} F1200" for k in range(rows)]
     profile, lines = load(), (*FOREIGN.splitlines(), *strokes)
     return print_page("long.gcode", Program(lines, dry_run(lines, profile), None), profile, known=False)
 
 
 def changed(monkeypatch: pytest.MonkeyPatch, **values: int) -> None:
-    """Pages whose pace has other constants."""
+    """Build pages with other drawing constants."""
     script = bundle(TEMPLATE / "main.js")
     for name, value in values.items():
         begin = script.index(f"const {name} = ")
@@ -97,7 +97,7 @@ def test_how_much_is_drawn_stays_between_0_and_100_per_cent_while_the_slider_mov
 
 
 def handles(browser: Browser) -> tuple[int, int]:
-    """The places of the two handles that limit the layers."""
+    """Positions of the two handles that limit the layers."""
     low, high = (int(browser.value(f"document.getElementById('layer-{end}').value")) for end in ("low", "high"))
     return low, high
 

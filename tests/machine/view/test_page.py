@@ -1,4 +1,4 @@
-"""The page as a file: nothing fetched, nothing that a name could inject, written whole; and the commands that write it."""
+"""The page as a file: it fetches nothing, no name can inject code, and it is written whole; and the commands that write it."""
 
 import base64
 import re
@@ -56,7 +56,7 @@ class Elements(HTMLParser):
 
 
 def shown(name: str = NASTY, live: bool = False) -> tuple[bytes, Elements]:
-    """The page of parts alone under a name."""
+    """The page of parts without G-code, under a name."""
     profile, decomposition, _, _ = hand.printed()
     content = page(name, of_parts(decomposition, profile), live)
     return content, Elements(content.decode())

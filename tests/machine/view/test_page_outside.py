@@ -1,4 +1,4 @@
-"""The page of a running print, when it hears how that has ended."""
+"""The page of a running print, after it receives the final state."""
 
 import json
 
@@ -12,7 +12,7 @@ OUTSIDE = TEMPLATE / "panel" / "outside.js"
 
 
 def orders_hidden(state: PrintState) -> bool:
-    """Whether a page that hears of a state offers no orders any more, and asks no further."""
+    """Whether a page that receives a state hides its commands and stops polling."""
     told = json.dumps(PrintStatus(state).json())
     act = f"""
         let asked = 0;

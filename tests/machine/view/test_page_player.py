@@ -1,4 +1,4 @@
-"""The player of a print's page: how often it asks for the next picture."""
+"""The player of a print's page: how often it requests the next picture."""
 
 from machine.view.page import TEMPLATE
 from tests.machine.fake_page import needs_node, on_fake_page

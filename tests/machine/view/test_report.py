@@ -18,7 +18,7 @@ UNITS = {"h": 3600, "m": 60, "s": 1}
 
 
 def seconds(text: str) -> int:
-    """The seconds of 1h 6m 15s."""
+    """Seconds of a text like 1h 6m 15s."""
     return sum(int(number) * UNITS[unit] for number, unit in re.findall(r"(\d+)([hms])", text))
 
 

@@ -1,4 +1,4 @@
-"""The text of the G-code in the page: letter for letter, read back by the format in CONTRIBUTING.md."""
+"""The text of the G-code in the page: identical after decoding by the format in CONTRIBUTING.md."""
 
 import numpy as np
 import pytest

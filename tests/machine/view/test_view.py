@@ -1,4 +1,4 @@
-"""The page's bytes, read back by their description, against the program, its dry run and its parts."""
+"""The page's bytes, decoded by their specification, against the program, its dry run and its parts."""
 
 from dataclasses import replace
 from functools import cache
@@ -189,7 +189,7 @@ def test_faces_are_marked_risky_as_printed_and_straight_up() -> None:
     assert program.decomposition is not None
     f0, f1 = header["parts"][1]["mesh"]["faces"]
     marks, arm = columns["face_marks"][f0:f1].astype(int), program.decomposition.parts[1]
-    assert arm.mesh.areas_mm2[marks & 1 > 0].sum() == 0.0  # printed sideways it carries itself
+    assert arm.mesh.areas_mm2[marks & 1 > 0].sum() == 0.0  # printed sideways it supports itself
     assert arm.mesh.areas_mm2[marks & 2 > 0].sum() == pytest.approx(100.0)  # its underside, 10 x 10
 
 
@@ -277,7 +277,7 @@ def test_thinning_keeps_the_ends_of_strokes_and_every_other_move() -> None:
     rows = shown_rows(program, most=500)
     assert len(rows) <= 500
     assert {0, *np.flatnonzero(program.kind != MoveKind.EXTRUDE).tolist()} <= set(rows.tolist()) | {0}
-    corners = np.flatnonzero(np.abs(np.diff(program.end[:, 1])) > 0.5)  # the last points of the rows of the wave
+    corners = np.flatnonzero(np.abs(np.diff(program.end[:, 1])) > 0.5)  # last points of the rows of the wave
     assert set(corners.tolist()) <= set(rows.tolist())
 
 

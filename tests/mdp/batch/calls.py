@@ -1,4 +1,4 @@
-"""Calls that work, fail, die or last, for workers to import."""
+"""Calls that succeed, fail, kill their process or last, for workers to import."""
 
 import os
 import signal
@@ -14,7 +14,7 @@ def greet(name: str) -> str:
 
 
 def squares(count: int) -> str:
-    """Tell the first squares."""
+    """Report the first squares."""
     for number in range(count):
         tell(number * number)
     return "all"
@@ -25,7 +25,7 @@ def process() -> int:
 
 
 def wait_for_another() -> None:
-    """Tell the number of a process in the session of this one, and wait for it."""
+    """Report the process id of another process in this session, and wait for it."""
     other = Interpreter("import time; time.sleep(60.0)", leads=False)
     tell(other.process.pid)
     other.process.wait()
@@ -41,7 +41,7 @@ def unspeakable() -> Any:
 
 
 def die(note: Path, times: int) -> str:
-    """Kill its process the first so many times."""
+    """Kill its own process the first `times` times."""
     _note(note)
     if note.read_text().count("begun") <= times:
         os.kill(os.getpid(), signal.SIGKILL)
@@ -55,13 +55,13 @@ def sleep(note: Path) -> None:
 
 
 def noise() -> str:
-    print("what a call prints")  # noqa: T201 - goes nowhere
+    print("what a call prints")  # noqa: T201 - discarded
     os.write(1, b"and what a library prints")
     return "quiet"
 
 
 def begin(note: Path) -> str:
-    """What a note says, as soon as it does."""
+    """The content of a note, as soon as it has any."""
     while not (note.exists() and note.read_text()):
         time.sleep(0.02)
     return note.read_text()

@@ -1,4 +1,4 @@
-"""Isolation: what a call gives, and what becomes of one that kills its process or takes too long."""
+"""Isolation: the results of calls, and calls that kill their process or take too long."""
 
 import os
 import signal
@@ -78,7 +78,7 @@ def test_a_process_ends_in_the_midst_of_its_work_when_the_one_that_asked_is_kill
 
 
 def is_at_work(pid: int) -> bool:
-    """Whether a process is there and has not ended; who has started it may not have asked what became of it."""
+    """Whether a process exists and has not ended; its parent may not have waited for it yet."""
     state = subprocess.run(["ps", "-o", "stat=", "-p", str(pid)], capture_output=True, text=True).stdout
     return state[:1] not in ("", "Z")
 

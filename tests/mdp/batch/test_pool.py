@@ -1,4 +1,4 @@
-"""Pool: many calls on this machine's cores, and on the workers of a dask cluster."""
+"""Pool: many calls on the cores of this machine and on the workers of a dask cluster."""
 
 import os
 import signal
@@ -73,7 +73,7 @@ def test_a_scheduler_that_dies_is_one_sentence() -> None:
 
 @pytest.fixture
 def scheduler(tmp_path: Path) -> Iterator[str]:
-    """The address of a scheduler with no worker yet."""
+    """The address of a scheduler that has no workers yet."""
     pytest.importorskip("distributed")
     file = tmp_path / "scheduler.json"
     command = [
@@ -122,7 +122,7 @@ def test_what_a_killed_machine_had_is_done_by_another(scheduler: str, tmp_path: 
 
 
 def slow_at_first(note: Path, result: int) -> int:
-    """Take long the first time that it is begun, for a machine that will be killed meanwhile."""
+    """Take long in the first run, on a worker that will be killed meanwhile."""
     if not note.exists() and result == 0:
         sleep(note)
     return result
@@ -139,7 +139,7 @@ def test_a_worker_that_does_not_see_a_folder_is_told(scheduler: str, tmp_path: P
 
 
 def until_refused(scheduler: str, folder: Path) -> None:
-    """The worker may need a moment to be known."""
+    """Retry until the scheduler knows the worker, which may take a moment."""
     for _ in range(100):
         with connected(Workers(scheduler, 1, 0, folders=(folder,))):
             time.sleep(0.1)

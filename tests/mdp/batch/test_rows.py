@@ -1,4 +1,4 @@
-"""Rows: what is read of a table is what was written, however its writing ended."""
+"""Rows: a table reads back as it was written, wherever its writing stopped."""
 
 from dataclasses import dataclass
 from pathlib import Path

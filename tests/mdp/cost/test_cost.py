@@ -1,4 +1,4 @@
-"""What a cut costs: its rim against exact sections, feather edges, faces that are free or hidden, and cuts that do not pay."""
+"""The cost of a cut: its rim against exact sections, feather edges, faces that are free or hidden, and cuts that do not pay."""
 
 import numpy as np
 import pytest
@@ -39,7 +39,7 @@ def _swept(mesh: Mesh, direction: Floats, feather: float = 0.0) -> Gains:
 
 
 def _places(mesh: Mesh, hidden_share: float = 1.0) -> tuple[SeamPlaces, Solid]:
-    """Where seams cost how much on a model, and its solid."""
+    """Seam weights on a model, and its solid."""
     solid = solid_of(mesh)
     sets = (f"search.hidden_seam_share={hidden_share}", "search.feature_mm2=0", "search.feature_weight=1")
     return SeamPlaces.of(mesh, solid, load(settings=sets).search), solid
@@ -85,12 +85,12 @@ def test_an_edge_below_20_degrees_is_a_feather_edge(lean_deg: float, feathered_m
 def test_a_face_that_an_earlier_cut_laid_open_carries_no_seam() -> None:
     first, second = Plane(np.array([0.0, 0.0, 1.0]), 10.0), Plane(np.array([1.0, 0.0, 0.0]), 0.0)
     places, whole = _places(shapes.box(20.0, 20.0, 30.0))
-    assert _seam(places, whole, second).length_mm == pytest.approx(20.0 + 30.0 + 30.0)  # the platform's side is free
+    assert _seam(places, whole, second).length_mm == pytest.approx(20.0 + 30.0 + 30.0)  # the side on the build plate is free
     assert _seam(places, below(whole, first), second).length_mm == pytest.approx(10.0 + 10.0)
 
 
 def test_a_seam_along_a_crease_counts_less_than_beside_it() -> None:
-    places, branch = _places(shapes.tee(), hidden_share=0.4)  # a bar whose underside is at 30 mm on a stem
+    places, branch = _places(shapes.tee(), hidden_share=0.4)  # a bar on a stem; its underside is at 30 mm
     crease, stem = (_seam(places, branch, Plane(np.array([0.0, 0.0, 1.0]), z)) for z in (29.9, 15.0))
     assert crease.length_mm == stem.length_mm == pytest.approx(40.0)
     assert 0.4 * 40.0 <= crease.weighted_mm < stem.weighted_mm <= 40.0
@@ -178,6 +178,6 @@ def test_a_piece_lies_on_its_source_and_what_has_none_lies_in_a_cut(turn: float,
 def test_the_whole_model_is_its_own_source() -> None:
     mesh = shapes.box()
     other = piece_of(solid_of(mesh), origin_of(solid_of(mesh)))
-    assert (other.sources == MADE_BY_A_CUT).all()  # another solid of the same mesh is another model
+    assert (other.sources == MADE_BY_A_CUT).all()  # another solid of an equal mesh is another model
     own = solid_of(mesh)
     assert (piece_of(own, origin_of(own)).sources >= 0).all()

@@ -1,4 +1,4 @@
-"""Footing: what the plate holds, by the closed formulas of a glued beam."""
+"""Footing: adhesion to the build plate, by the closed formulas of a glued beam."""
 
 from dataclasses import replace
 
@@ -26,7 +26,7 @@ def footing_of(solid: m3.Manifold, rotation: Floats = UPRIGHT, **changes: object
 
 
 def test_the_tension_under_a_rod_is_that_of_a_push_at_its_top_less_its_weight() -> None:
-    """1 N at 60 mm bends pi r^3 / 4; the weight of pi r^2 h of 1.24 g/cm3 presses on pi r^2."""
+    """1 N at 60 mm acts on the section modulus pi r^3 / 4; the weight of pi r^2 h of 1.24 g/cm3 presses on pi r^2."""
     footing = footing_of(rod(5.0, 60.0), density_g_cm3=1.24, brim_mm=5.0)
     pressed_mpa = 60.0 * 1.24e-6 * 9.81
     assert footing.tension_mpa == pytest.approx(60.0 / (np.pi * 125.0 / 4.0) - pressed_mpa, rel=1e-3)
@@ -46,7 +46,7 @@ def test_a_solid_is_measured_as_it_is_turned() -> None:
     plate = m3.Manifold.cube((40.0, 30.0, 4.0), True)
     on_edge = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
     flat, edge = (footing_of(plate, turn, density_g_cm3=1e-9).tension_mpa for turn in (UPRIGHT, on_edge))
-    # A push of 1 N at the top against the section modulus of 40 x 30 mm and of 4 x 30 mm, pushed over a corner.
+    # A push of 1 N at the top towards a corner, against the section moduli of 40 x 30 mm and of 4 x 30 mm.
     assert flat == pytest.approx(4.0 * np.hypot(6 / (40 * 30**2), 6 / (30 * 40**2)), rel=1e-6)
     assert edge == pytest.approx(40.0 * np.hypot(6 / (4 * 30**2), 6 / (30 * 4**2)), rel=1e-6)
 
@@ -64,13 +64,13 @@ def table(legs_mm: float) -> m3.Manifold:
 
 
 def balanced(radius_mm: float, aside_mm: float) -> m3.Manifold:
-    """A slab of 30 x 30 x 10 mm that stands on a rod of 40 mm, so far from the slab's middle."""
+    """A slab of 30 x 30 x 10 mm on a rod of 40 mm, aside_mm from the rod's axis."""
     return rod(radius_mm, 41.0) + m3.Manifold.cube((30.0, 30.0, 10.0), True).translate((aside_mm, 0.0, 45.0))
 
 
 def test_a_base_of_a_fifth_of_the_shadow_lacks_nothing_and_half_of_it_half() -> None:
     assert standing(m3.Manifold.cube((20.0, 20.0, 20.0))).narrow == 0.0
-    assert standing(table(9.5)).narrow == pytest.approx(1.0 - 361.0 / 3600.0 / 0.2, abs=0.02)  # legs beside the plate's shadow
+    assert standing(table(9.5)).narrow == pytest.approx(1.0 - 361.0 / 3600.0 / 0.2, abs=0.02)  # legs by the shadow
 
 
 def test_a_pillar_may_be_tilted_until_its_middle_is_over_its_edge() -> None:
@@ -80,20 +80,20 @@ def test_a_pillar_may_be_tilted_until_its_middle_is_over_its_edge() -> None:
 
 @pytest.mark.parametrize(("radius_mm", "unsteady"), [(20.0, 0.489), (10.0, 1.0)])
 def test_a_stance_is_as_unsteady_as_its_tension_is_near_a_quarter_of_the_adhesion(radius_mm: float, unsteady: float) -> None:
-    """1 N at 300 mm bends pi r^3 / 4 of a base with 5 mm of brim: 0.0244 and 0.113 MPa; 0.05 MPa is as bad as more."""
+    """1 N at 300 mm on the section modulus of a base with 5 mm of brim: 0.0244 and 0.113 MPa; anything from 0.05 MPa counts 1."""
     footing = footing_of(rod(radius_mm, 300.0), density_g_cm3=1e-9, brim_mm=5.0)
     assert footing.unsteady == pytest.approx(unsteady, rel=0.01)
 
 
 def test_a_thin_rod_is_held_by_its_brim_alone() -> None:
-    """1 N at 50 mm bends pi r^3 / 4: 8 MPa at 2 mm, 0.19 MPa with 5 mm of brim around it; the plate holds 0.2 MPa."""
+    """1 N at 50 mm on pi r^3 / 4: 8 MPa at 2 mm, 0.19 MPa with 5 mm of brim around it; the plate holds 0.2 MPa."""
     assert footing_of(rod(2.0, 50.0), brim_mm=5.0).held()
     assert not footing_of(rod(2.0, 50.0), brim_mm=4.0).held()
 
 
 def test_a_table_on_thin_legs_is_held() -> None:
     assert standing(table(3.0)).held()
-    assert not standing(table(1.0)).held()  # 4 of 3600 mm2 are no base for a brim
+    assert not standing(table(1.0)).held()  # 4 of 3600 mm2 are too little for a brim
 
 
 @pytest.mark.parametrize("thick_mm", [0.05, 0.1, 0.2])

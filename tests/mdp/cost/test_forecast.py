@@ -1,4 +1,4 @@
-"""Forecast: what planes would leave risky, summed without cutting, against what is left after cutting."""
+"""Forecast: the area that planes would leave risky, summed without cutting, against the area left after cutting."""
 
 import manifold3d as m3
 import numpy as np
@@ -31,7 +31,7 @@ def _surface(mesh: Mesh) -> Forecast:
 
 
 def _cut_and_summed(mesh: Mesh, planes: list[Plane]) -> float:
-    """Risky area of the parts after really cutting, the faces laid open by cuts left out."""
+    """Risky area of the parts after actual cuts, without the faces that cuts create."""
     total, below = 0.0, solid_of(mesh)
     for position, plane in enumerate(planes):
         above, below = cut(below, plane)
@@ -80,7 +80,7 @@ WEIGHT = PROFILE.search.unsupportable_weight
 
 
 def cap_on_a_stem() -> Mesh:
-    """A round cap on a stem, drilled across so that a crown carries itself."""
+    """A round cap on a stem, with a cross hole so that a crown supports itself."""
     cap = m3.Manifold.sphere(20, 48).translate((0, 0, 34))
     drill = m3.Manifold.cylinder(60, 3, 3, 32, True).rotate((90, 0, 0)).translate((0, 0, 36))
     return standing(m3.Manifold.cylinder(20, 8, 8, 48) + cap - drill)

@@ -1,4 +1,4 @@
-"""Hidden places: creases, necks and pits are hidden, what is flat or round outward is not, whatever the mesh."""
+"""Hidden seam positions: creases, necks and pits are hidden, flat and convex surfaces are not, in any triangulation."""
 
 import manifold3d as m3
 import numpy as np
@@ -11,7 +11,7 @@ from tests import shapes
 
 
 def _hourglass(segments: int) -> Solid:
-    """Turned: 10 mm wide at both ends, 5 mm at the neck at z = 0."""
+    """A solid of revolution, 10 mm wide at both ends and 5 mm at the neck at z = 0."""
     heights = np.linspace(-15.0, 15.0, segments)
     outline = [(0.0, -15.0), *((7.5 - 2.5 * np.cos(z * np.pi / 15.0), z) for z in heights), (0.0, 15.0)]
     return m3.CrossSection([np.array(outline)]).revolve(2 * segments)

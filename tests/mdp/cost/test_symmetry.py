@@ -12,7 +12,7 @@ from tests import shapes
 
 
 def _arms(other_mm: float) -> Mesh:
-    """A post with two round arms towards -x and +x, 30 mm long and as long as that."""
+    """A post with two round arms towards -x (30 mm long) and +x (other_mm)."""
     arms = [m3.Manifold.cylinder(length, 4, 4, 24).rotate((0, 60 * side, 0)) for side, length in ((-1, 30.0), (1, other_mm))]
     return mesh_of(m3.Manifold.cylinder(40, 7, 7, 48) + sum((arm.translate((0, 0, 20)) for arm in arms), m3.Manifold()))
 
@@ -20,7 +20,7 @@ def _arms(other_mm: float) -> Mesh:
 @pytest.mark.parametrize(("other_mm", "across_x"), [(30.0, True), (30.5, True), (22.0, False)])
 def test_a_model_is_symmetric_where_its_mirror_image_lies_on_it(other_mm: float, across_x: bool) -> None:
     normals = np.abs([mirror.normal for mirror in find_mirrors(_arms(other_mm))])
-    assert normals[:, 1].max() == pytest.approx(1.0)  # front and back are always alike
+    assert normals[:, 1].max() == pytest.approx(1.0)  # front and back always mirror each other
     assert (normals[:, 0].max() > 0.999) == across_x
 
 
@@ -33,7 +33,7 @@ def test_a_plane_is_its_image_s_image_and_an_upright_one_its_own() -> None:
     assert upright is not None
     own = mirror.image(upright)
     assert [*own.normal, own.offset_mm] == pytest.approx([*upright.normal, upright.offset_mm])
-    assert mirror.upright(upright, middle) is None  # nothing is left to change
+    assert mirror.upright(upright, middle) is None  # already equal to its own image
 
 
 def test_nothing_mirrors_a_model_without_symmetry() -> None:

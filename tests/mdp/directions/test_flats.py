@@ -1,4 +1,4 @@
-"""Flats: the directions along a model's large flat faces, of solids whose faces are known."""
+"""Flats: the directions along a model's large flat faces, for solids with known faces."""
 
 import manifold3d as m3
 import numpy as np
@@ -19,7 +19,7 @@ def prism(sides: int, height_mm: float = 30.0) -> Mesh:
 
 
 def same(directions: Floats, expected: Floats) -> bool:
-    """Whether both hold the same directions, up to half a degree."""
+    """Whether two sets hold equal directions, within half a degree."""
     near = directions @ np.asarray(expected).T > np.cos(np.radians(0.5))
     return bool(near.any(axis=0).all() and near.any(axis=1).all())
 

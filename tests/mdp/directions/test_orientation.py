@@ -21,7 +21,7 @@ ANY_DEG = st.floats(-180.0, 180.0)
 
 
 def cone() -> Mesh:
-    """A cone on its point: 30 mm across, 30 mm high."""
+    """A cone on its tip: 30 mm across, 30 mm high."""
     return standing(m3.Manifold.cylinder(30, 0.0, 15.0, 64))
 
 
@@ -146,7 +146,7 @@ def apart_deg(one: float, other: float, period_deg: float = 360.0) -> float:
 
 
 def star(corners: int) -> Solid:
-    """An upright prism over a circle with waves on it, a crest along x."""
+    """An upright prism over a wavy circle, a crest along x."""
     turns = np.linspace(0.0, 2.0 * np.pi, 240, endpoint=False)
     radius = 10.0 + 3.0 * np.cos(corners * turns)
     return m3.CrossSection([np.stack([radius * np.cos(turns), radius * np.sin(turns)], axis=1)]).extrude(5.0)

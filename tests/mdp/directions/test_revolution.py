@@ -1,4 +1,4 @@
-"""Turned bodies: their axes are found however they lie, and nothing else is one."""
+"""Solids of revolution: their axes are found in any orientation, and other solids have none."""
 
 import manifold3d as m3
 import numpy as np
@@ -54,4 +54,4 @@ def test_an_axis_is_square_to_what_lies_along_or_across_it() -> None:
     found = find_revolution(turned("a vase"))
     assert found is not None
     answers = [found.is_square_to(unit(direction)) for direction in ((0, 0, -1), (1, 2, 0), (0.07, 0, 1), (0.1, 0, 1), (1, 0, 1))]
-    assert answers == [True, True, True, False, False]  # upright, level, 4, 6 and 45 degrees aslant
+    assert answers == [True, True, True, False, False]  # upright, level, and 4, 6 and 45 degrees aslant

@@ -1,4 +1,4 @@
-"""Directions spread evenly: every cap holds its share of them. Frames across directions."""
+"""Evenly spread directions: every cap holds its share of them; and frames across directions."""
 
 import numpy as np
 import pytest

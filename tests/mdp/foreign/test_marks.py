@@ -1,4 +1,4 @@
-"""Marks: what the volumes that are not printed, their settings and the paint of a slicer file become, and where they lie."""
+"""Marks: volumes that are not printed, their settings and the paint of a slicer file, and their positions."""
 
 import zipfile
 from itertools import product
@@ -32,7 +32,7 @@ from tests.shapes import from_manifold
 
 
 def moved(solid: m3.Manifold, linear: Floats) -> Mesh:
-    """A solid of the file where it lies after reading, by what brings the block of the same file there."""
+    """A solid of the file at its position after reading, moved as the block of that file."""
     block = from_manifold(BLOCK)
     places = block.vertices @ linear.T
     low, high = places.min(axis=0), places.max(axis=0)
@@ -80,7 +80,7 @@ def test_a_modifier_of_eight_corners_that_is_no_box_keeps_its_own_shape(
     assert solid.num_vert() == 8
     assert isinstance(modifier.volume, MeshVolume)
     assert modifier.volume.mesh.volume_mm3 == pytest.approx(solid.volume())
-    assert modifier.volume.mesh.volume_mm3 < 799.0  # of 10 x 8 x 10 mm
+    assert modifier.volume.mesh.volume_mm3 < 799.0  # less than the volume of 10 x 8 x 10 mm
 
 
 @pytest.mark.parametrize(

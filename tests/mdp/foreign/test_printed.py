@@ -1,4 +1,4 @@
-"""Printed: what a slicer file prints of its volumes, negative volumes and what lies below the plate taken away."""
+"""Printed solids of a slicer file: negative volumes and everything below the build plate are subtracted."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ from tests.shapes import from_manifold
 
 
 def drawn(rng: np.random.Generator, plates: int) -> list[Object]:
-    """Objects with parts, negatives and marks that overlap at random, far apart from each other on their plates."""
+    """Objects with randomly overlapping parts, negatives and marks, far apart from each other on their plates."""
     objects = []
     for k in range(rng.integers(1, 4)):
         kinds = ["part", *rng.choice(["part", "negative", "modifier", "support", "no_support"], rng.integers(0, 5))]

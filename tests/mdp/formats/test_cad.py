@@ -38,7 +38,7 @@ def boxed(mesh: Mesh) -> Surface:
 
 
 def ring(corners: int, outer: float, inner: float | None = None) -> list[Corner]:
-    """A polygon with so many corners, or a star where every second one lies nearer."""
+    """A polygon with a number of corners, or a star in which every second corner is nearer."""
     radii = [outer, outer if inner is None else inner]
     angles = np.arange(corners) * 2.0 * np.pi / corners
     return [(float(radii[k % 2] * np.cos(a)), float(radii[k % 2] * np.sin(a))) for k, a in enumerate(angles)]

@@ -1,4 +1,4 @@
-"""GLB files: nodes, accessors and what is refused."""
+"""GLB files: nodes, accessors and refusals."""
 
 import json
 import struct
@@ -20,13 +20,13 @@ def test_glb_nodes_are_placed_and_coordinates_are_taken_as_mm_with_z_up(tmp_path
 
 
 def _document() -> bytes:
-    """That of a box of 10 mm."""
+    """The document of a box of 10 mm."""
     content = files.glb(files.placed(10, 10, 10))
     return content[20 : 20 + int.from_bytes(content[12:16], "little")]
 
 
 def _edited(**changes: object) -> bytes:
-    """The GLB file of a box of 10 mm with some of its document changed."""
+    """The GLB file of a box of 10 mm with part of its document changed."""
     content = files.glb(files.placed(10, 10, 10))
     length = int.from_bytes(content[12:16], "little")
     text = json.dumps({**json.loads(content[20 : 20 + length]), **changes}).encode()

@@ -1,4 +1,4 @@
-"""Small files that would hang, fill the memory or break the reader are refused with a sentence, and what is only odd is read."""
+"""Small files that would hang, exhaust memory or crash a reader are refused with a message; merely odd files are read."""
 
 import json
 import struct

@@ -41,7 +41,7 @@ def test_a_binary_ply_may_mix_triangles_and_quads_and_carry_other_tables(tmp_pat
     rows = [struct.pack(">fff", *point) for point in points]
     rows += [struct.pack(f">BB{len(face)}i", 1, len(face), *face) for face in faces]
     mesh, notes = read_mesh(save(tmp_path / "a.ply", header.encode() + b"".join(rows) + struct.pack(">ii", 0, 1) + b"\n"))
-    assert (mesh.volume_mm3, len(mesh.faces), len(notes)) == (pytest.approx(729), 12, 1)  # its size is told
+    assert (mesh.volume_mm3, len(mesh.faces), len(notes)) == (pytest.approx(729), 12, 1)  # the note reports its size
 
 
 def test_the_numbers_of_an_ascii_ply_may_stand_in_any_lines(tmp_path: Path) -> None:
@@ -51,7 +51,7 @@ def test_the_numbers_of_an_ascii_ply_may_stand_in_any_lines(tmp_path: Path) -> N
 
 
 def _tetrahedron(vertex: str, face: str, corners: list[str], sides: list[str]) -> bytes:
-    """A pyramid of four faces; property lines and what they hold for every vertex and every face."""
+    """A tetrahedron with extra property lines and their values for every vertex and every face."""
     points = ["0 0 0", "9 0 0", "0 9 0", "0 0 9"]
     faces = ["3 0 2 1", "3 0 1 3", "3 1 2 3", "3 0 3 2"]
     header = f"ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n{vertex}"

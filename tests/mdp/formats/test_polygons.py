@@ -1,4 +1,4 @@
-"""Polygons of OBJ, OFF and PLY files become triangles. OBJ files: what may stand in a line, and indices counted backwards."""
+"""Polygons of OBJ, OFF and PLY files become triangles; OBJ files: allowed lines, and negative indices."""
 
 from pathlib import Path
 

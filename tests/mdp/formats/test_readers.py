@@ -1,4 +1,4 @@
-"""What every reader of a mesh file promises, in any format."""
+"""Guarantees of every mesh reader, in any format."""
 
 import struct
 from pathlib import Path
@@ -21,7 +21,7 @@ SIZES = st.floats(1.0, 500.0, width=32)
 
 
 def outcome(path: Path) -> Mesh | None:
-    """The mesh of a file, or None when it is refused; anything else that is raised fails the test."""
+    """The mesh of a file, or None if it is refused; any other exception fails the test."""
     try:
         return read_mesh(path)[0]
     except MeshError:

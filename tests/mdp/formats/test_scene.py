@@ -116,7 +116,7 @@ def test_without_its_library_collada_says_what_to_install(tmp_path: Path, monkey
 
 def test_without_the_extra_the_sentence_says_what_a_dae_file_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def missing(*given: object, **more: object) -> None:
-        raise ImportError("no loader")  # with no name, as trimesh raises it
+        raise ImportError("no loader")  # without a name, as trimesh raises it
 
     monkeypatch.setattr("trimesh.load_scene", missing)
     sentence = refusal(save(tmp_path / "a.dae", b"<COLLADA/>"))

@@ -1,4 +1,4 @@
-"""Slicer files: what their volumes are, on which plate objects stand, what is left out and what is refused."""
+"""Slicer files: their volumes, the plates of their objects, omissions and refusals."""
 
 from pathlib import Path
 
@@ -158,7 +158,7 @@ def area(corners: Floats) -> float:
 
 
 def drawn(rng: np.random.Generator, corners: Floats, depth: int, areas: dict[int, float]) -> str:
-    """The digits of a triangle that is halved at random, the first to be read first; areas: by paint, to which it adds."""
+    """The digits of a randomly split triangle, in reading order; areas: the area of each paint, which is added to."""
     sides = int(rng.integers(4)) if depth else 0
     if not sides:
         paint = int(rng.integers(7))
@@ -189,7 +189,7 @@ def test_shares_are_those_of_the_triangles_that_a_brush_has_made(seed: int) -> N
     [
         ("4", {1: 1.0}),
         ("8", {2: 1.0}),
-        ("2C", {5: 1.0}),  # 3 more than the digit before
+        ("2C", {5: 1.0}),  # 3 more than the previous digit
         ("041", {1: 0.5, 0: 0.5}),  # one side halved: the second half is painted
         ("0842", {1: 0.5, 2: 0.25, 0: 0.25}),  # two sides halved: the last of the three is half of it
         ("44", "1 digit left over"),

@@ -76,7 +76,7 @@ def test_components_that_double_without_end_are_refused_before_they_are_placed(t
 
 
 def _painted(path: Path, resources: str, attributes: dict[int, str], of_object: str = "") -> list[int] | None:
-    """The colours of a box whose triangles have more attributes, beside resources of the model and attributes of the object."""
+    """The colours of a box whose triangles have further attributes, beside other resources and object attributes."""
     text = files.threemf_model({1: files.threemf_mesh(files.placed(9, 9, 9))}, '<item objectid="1"/>')
     pieces = text.split("<triangle ")
     pieces[1:] = [f"{attributes.get(k, '')} {piece}" for k, piece in enumerate(pieces[1:])]
@@ -105,7 +105,7 @@ def test_the_colour_of_a_whole_object_of_a_3mf_marks_none_of_its_triangles(tmp_p
 
 
 def _rewritten(path: Path, changes: dict[str, str], names: dict[str, str] | None = None) -> Path:
-    """A package of a box with texts of its model changed, and with other names of its parts."""
+    """A package of a box with replaced texts in its model, and with other names of its parts."""
     files.threemf(path, {1: files.threemf_mesh(files.placed(10, 20, 30))}, '<item objectid="1"/>')
     with zipfile.ZipFile(path) as archive:
         texts = {name: archive.read(name).decode() for name in archive.namelist()}

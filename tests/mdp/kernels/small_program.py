@@ -1,4 +1,4 @@
-"""A program of two files, a kernel and its helper, with a copy of mdp.kernels, run by fresh interpreters."""
+"""A program of two files, a kernel and its helper, with a copy of mdp.kernels, run by new interpreters."""
 
 import os
 import shutil
@@ -15,7 +15,7 @@ PART_FILE = "from mdp.kernels.kernel import helper\n\nPART = 1.0\n\n\n@helper\nd
 
 
 def write_program(folder: Path) -> Path:
-    """Write the program; returns the package that its two files, near.py and far.py, lie in."""
+    """Write the program; returns the package that contains its two files, near.py and far.py."""
     package = folder / "mdp"
     package.mkdir(parents=True)
     shutil.copytree(
@@ -32,7 +32,7 @@ def write_program(folder: Path) -> Path:
 
 
 def output_of(program: Path, code: str, **environment: str) -> str:
-    """What a new interpreter prints."""
+    """The output of a new interpreter."""
     done = subprocess.run(
         [sys.executable, "-c", code],
         cwd=program.parent,
@@ -45,6 +45,6 @@ def output_of(program: Path, code: str, **environment: str) -> str:
 
 
 def result_and_compilations(program: Path, before: str = "", **environment: str) -> str:
-    """What a new interpreter works out for near(2.0), and how often it had to compile; before: code that it runs first."""
+    """The result of near(2.0) in a new interpreter, and its number of compilations; before: code that it runs first."""
     code = f"{before}; from mdp.near import near; print(near(2.0), sum(near.stats.cache_misses.values()))".removeprefix("; ")
     return output_of(program, code, **environment)

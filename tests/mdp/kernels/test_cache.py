@@ -1,6 +1,6 @@
-"""Where compiled kernels are cached: a program of two files, edited between runs of the interpreter.
+"""The cache of compiled kernels: a program of two files, edited between runs of the interpreter.
 
-What loading kernels from the cache does without, and kernels compiled on top of them.
+Modules that are not needed to load cached kernels, and kernels compiled on top of them.
 """
 
 import subprocess

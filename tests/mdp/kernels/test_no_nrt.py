@@ -1,4 +1,4 @@
-"""Helpers without numba's runtime: what they must not do would free an array twice or never, and nobody would see it."""
+"""Helpers without numba's runtime: forbidden operations, which would silently free an array twice or never."""
 
 import ast
 import re
@@ -42,13 +42,13 @@ def test_helpers_without_the_runtime_call_no_others_and_make_no_array() -> None:
 
 
 def _decorated(kind: str) -> list[ast.FunctionDef]:
-    """All functions of the packages with a decorator."""
+    """All decorated functions of the packages."""
     return [function for function in _functions() if kind in map(ast.unparse, function.decorator_list)]
 
 
 @cache
 def _functions() -> list[ast.FunctionDef]:
-    """All functions of the files that know the decorators."""
+    """All functions of the files that import the decorators."""
     paths = [path for package in ("mdp", "slicer", "machine") for path in (ROOT / package).rglob("*.py")]
     texts = [text for text in (path.read_text("utf-8") for path in paths) if "mdp.kernels.kernel" in text]
     return [node for text in texts for node in ast.walk(ast.parse(text)) if isinstance(node, ast.FunctionDef)]

@@ -1,4 +1,4 @@
-"""Pieces of work side by side."""
+"""Parallel tasks in processes."""
 
 import os
 import signal
@@ -71,7 +71,7 @@ def test_results_are_there_while_later_pieces_are_still_worked_on() -> None:
 
     def wait_from_the_third_on(number: int) -> int:
         if number > 1 and os.getpid() != HERE:
-            os.read(first_used, 1)  # never written before the first result is used
+            os.read(first_used, 1)  # not written before the first result is used
         return number
 
     results = parallel_map(wait_from_the_third_on, 5)
@@ -137,8 +137,8 @@ def test_our_own_threads_have_done_what_they_had_to_do_and_are_gone_when_a_copy_
     slow = threads.ahead(lambda: (time.sleep(0.3), threads.in_threads(lambda begin, end: finished.append(begin), 12)))
     alive = set(parallel_map(lambda number: (len(finished), threading.active_count()), 3, helps=False))
     assert slow.done()
-    assert alive == {(3, 2)}  # a copy has the thread that looks whether its parent is there
-    assert threads.ahead(pow, 2, 5).result() == 32  # others begin with the next work
+    assert alive == {(3, 2)}  # a forked copy also has the thread that watches for its parent's end
+    assert threads.ahead(pow, 2, 5).result() == 32  # other threads begin with the next task
 
 
 def test_a_copy_says_what_it_says_although_a_thread_held_the_stream_when_it_was_made() -> None:
@@ -221,7 +221,7 @@ def test_whatever_ends_the_parent_ends_its_copies(ended_by: signal.Signals) -> N
         working = [int(parent.stdout.readline()) for _ in range(2)]
         parent.send_signal(ended_by)
         try:
-            parent.communicate(timeout=10.0)  # until nobody holds the other end of the pipe
+            parent.communicate(timeout=10.0)  # until no process holds the other end of the pipe
         except BaseException:
             for process in working:
                 os.kill(process, signal.SIGKILL)

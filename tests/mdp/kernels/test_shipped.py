@@ -1,4 +1,4 @@
-"""Compiled kernels that come with the program: used where they fit, whatever they are laid beside, and nowhere else."""
+"""Compiled kernels shipped with the program: used only where they fit, wherever they are installed."""
 
 import os
 import shutil
@@ -24,12 +24,12 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def shipped(built: Path, program: Path) -> Path:
-    """The program's package, installed by a copy of what was built."""
+    """The program's package, installed by copying the build."""
     return shutil.copytree(built, program.parent, dirs_exist_ok=True) / "mdp"
 
 
 def compiled_here(tmp_path: Path) -> list[str]:
-    """The folders of the kernels that were compiled in spite of what was shipped."""
+    """The folders of the kernels that were compiled although kernels were shipped."""
     return sorted(path.name.partition("-")[0] for path in (tmp_path / "cached").glob("*"))
 
 
@@ -96,7 +96,7 @@ def test_who_can_write_no_folder_loses_nothing_where_all_was_shipped(shipped: Pa
 def test_a_processor_that_lacks_an_instruction_of_the_common_target_compiles_for_itself(
     program: Path, can: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.delenv("NUMBA_CPU_NAME", raising=False)  # chosen by this process for all that it starts
+    monkeypatch.delenv("NUMBA_CPU_NAME", raising=False)  # this process sets it for all processes that it starts
     monkeypatch.delenv("NUMBA_CPU_FEATURES", raising=False)
     code = (
         "from llvmlite import binding\n"

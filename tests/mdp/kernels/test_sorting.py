@@ -1,4 +1,4 @@
-"""Sorting inside kernels gives what numpy's gives."""
+"""Sorting inside kernels agrees with numpy's."""
 
 from itertools import pairwise
 

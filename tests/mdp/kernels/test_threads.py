@@ -1,4 +1,4 @@
-"""Rows shared out to threads: each once, whatever their number; work that begins ahead; arrays of one value."""
+"""Rows distributed to threads: each exactly once, for any number of threads; background tasks; arrays of one value."""
 
 import numpy as np
 import pytest

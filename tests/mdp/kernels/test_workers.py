@@ -1,4 +1,4 @@
-"""Workers: what a call tells and gives, and that a process ends with the one that asks, wherever that has died."""
+"""Workers: messages and results of a call, and a worker that ends with its parent however the parent died."""
 
 import os
 import pickle
@@ -17,7 +17,7 @@ WHOLE, LATER = ("load_kernels", ()), ("slice_bench", (Path("here"), "a file"))
 
 
 def heard(content: bytes) -> list[object]:
-    """What comes through a pipe that ends after some bytes, and then the end."""
+    """The messages received through a pipe that ends after some bytes, then the end."""
     told: list[object] = []
     listen(BytesIO(content), told.append, lambda: told.append("the end"))
     return told

@@ -1,4 +1,4 @@
-"""Records and lists made by hand."""
+"""Synthetic records and lists."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from mdp.ranking.record import VERSION, npz
 
 
 def write_record(file: Path, outcome: Floats, stage: Floats | None = None, **others: Any) -> None:
-    """A record of n candidates with features drawn from the file's name; others: arrays in the place of its own."""
+    """A record of n candidates with features seeded by the file's name; others: arrays that replace its own."""
     rng = np.random.default_rng(list(file.name.encode()))
     arrays = {
         "version": np.array(VERSION),
@@ -27,7 +27,7 @@ def write_record(file: Path, outcome: Floats, stage: Floats | None = None, **oth
 
 
 def drawn_list(seed: int, size: int) -> RatedList:
-    """A list whose candidates end the better the larger their M2 and the smaller their M6, with a little noise."""
+    """A list whose candidates end better with larger M2 and smaller M6, with a little noise."""
     rng = np.random.default_rng(seed)
     features = rng.random((size, len(PAPER_COLUMNS))).astype(np.float32)
     outcome = 1.0 - features[:, 1].astype(np.float64) + 0.5 * features[:, 5] + 0.05 * rng.random(size)
@@ -35,5 +35,5 @@ def drawn_list(seed: int, size: int) -> RatedList:
 
 
 def by_column(name: str) -> Scores:
-    """Scores that are a feature."""
+    """Scores that equal one feature."""
     return lambda rated: rated.table((name,))[:, 0].astype(np.float64)

@@ -11,7 +11,7 @@ FOLDER = Path(__file__).resolve().parents[4] / "shared" / "reference" / "urank"
 
 
 def reference_lists() -> list[tuple[Floats, Ints]]:
-    """Scores and ratings of every list; skips the test where the files are not."""
+    """Scores and ratings of every list; skips the test if the files are missing."""
     if not FOLDER.is_dir():
         pytest.skip("the published scores are not here")
     lines = [line.split() for line in (FOLDER / "label_output").read_text().splitlines()]

@@ -1,4 +1,4 @@
-"""Collecting records: what runs on workers, what goes on after an end, what is refused."""
+"""Collecting records: runs on workers, continuation after an end, and refusals."""
 
 import os
 import signal

@@ -1,4 +1,4 @@
-"""One search of a collection: the model that is read, its orientations, the record, the line of the index, the tables."""
+"""One search of a collection: reading the model, its orientations, the record, the index line, the tables."""
 
 import io
 from dataclasses import replace
@@ -55,7 +55,7 @@ def test_a_search_that_the_clock_ended_is_told_apart(tmp_path: Path) -> None:
 
 
 def test_orientations_are_the_sides_that_a_model_rests_on_and_end_with_them() -> None:
-    mesh = shapes.tee()  # on either end of its bar it leans on the foot of its stem, on its back nothing is risky
+    mesh = shapes.tee()  # on either end of its bar it leans on the foot of its stem; on its back no face is risky
     poses = [oriented(mesh, k, 45.0) for k in range(4)]
     sizes = [pose and np.ptp(pose.vertices, axis=0).round(2).tolist() for pose in poses]
     assert sizes == [[40.0, 10.0, 40.0], [46.96, 10.0, 40.25], [46.96, 10.0, 40.25], None]

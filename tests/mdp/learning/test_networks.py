@@ -32,7 +32,7 @@ def test_what_a_cut_saves_is_weighed_against_what_it_loses_for_ever() -> None:
 
 
 def planted(seed: int, size: int = 20) -> RatedList:
-    """A list whose candidates end the better the more M2 they have and the less of it is wasted, all shifted by list."""
+    """A list whose candidates end better with more M2 and less waste; its features share an offset."""
     rng = np.random.default_rng(seed)
     features = (rng.random(len(COLUMNS)) + rng.random((size, len(COLUMNS)))).astype(np.float32)
     wasted = features[:, COLUMNS.index("wasted")].astype(np.float64)

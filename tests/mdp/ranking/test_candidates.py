@@ -1,4 +1,4 @@
-"""The disc that every plane must clear, against the least circle by another library, and what clears it."""
+"""The disc that every plane must clear, against another library's least circle, and the planes that clear it."""
 
 import manifold3d as m3
 import numpy as np
@@ -16,7 +16,7 @@ PLACES = st.lists(st.tuples(st.integers(-20, 20), st.integers(-20, 20)), min_siz
 
 
 def feet(places: list[tuple[int, int]]) -> m3.Manifold:
-    """A plate 10 mm over the platform on round feet of 1 mm at some places."""
+    """A plate 10 mm above the build plate on round feet of 1 mm at given positions."""
     legs = [m3.Manifold.cylinder(12, 0.5, 0.5, 8).translate((x, y, 0)) for x, y in places]
     return m3.Manifold.batch_boolean([m3.Manifold.cube((50, 50, 3), True).translate((0, 0, 11.5)), *legs], m3.OpType.Add)
 

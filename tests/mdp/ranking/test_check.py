@@ -1,4 +1,4 @@
-"""Why a plane cannot cut, against the exact cut of it: every criterion asked of the solids themselves, the first that holds."""
+"""Reasons why a plane cannot cut, against its exact cut: every criterion tested on the solids, the first that applies."""
 
 import manifold3d as m3
 import numpy as np
@@ -28,7 +28,7 @@ def limits_for(mesh: Mesh, count: int) -> Bounds:
 
 
 def reasons(mesh: Mesh, limits: Bounds, row: int, offset_mm: float) -> list[Reason]:
-    """All that the exact cut says against a plane, in the order in which they count."""
+    """All reasons of the exact cut against a plane, in order of priority."""
     plane = Plane(limits.directions[row], offset_mm)
     above, below = cut(solid_of(mesh), plane)
     pieces = [piece for piece in above.decompose() if piece.volume() > 0.0]

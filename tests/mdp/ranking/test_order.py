@@ -1,4 +1,4 @@
-"""The orders of candidates against plain sorting: every candidate looked at, nothing checked ahead, no round cut short."""
+"""The orders of candidates against plain sorting: every candidate checked, none ahead of time, no round stopped early."""
 
 from collections.abc import Sequence
 from types import SimpleNamespace
@@ -31,12 +31,12 @@ DIRECTIONS = spread(40, 0.2)
 RISKY_MM2, BOUND_MM2 = 100.0, 60.0
 seeds = st.integers(0, 10_000)
 
-Place = tuple[int, int]  # a table and a row of it
+Place = tuple[int, int]  # a table and one of its rows
 
 
 class Drawn(NamedTuple):
-    """Candidates of one node as numbers. same: the first of the same plane, whose answers hold for it: whether it can be cut,
-    whether its base is weak, the volume of its part."""
+    """Candidates of one node as arrays. same: index of the first candidate with the same plane, whose feasibility, weak base
+    and part volume hold for it."""
 
     direction: Ints
     offset: Floats
@@ -56,7 +56,7 @@ class Drawn(NamedTuple):
 
 
 def drawn(seed: int, most: int = 400) -> Drawn:
-    """Some candidates, some of them alike in gain, many alike in direction."""
+    """Random candidates, some with equal gain, many with equal direction."""
     rng = np.random.default_rng(seed)
     n = int(rng.integers(0, most))
     residual = np.where(rng.random(n) < 0.3, 0.0, 10.0 ** rng.uniform(-3, 2, n))
@@ -79,7 +79,7 @@ def drawn(seed: int, most: int = 400) -> Drawn:
 
 
 def table_of(own: Drawn, least_gain_mm2: float = 0.0) -> CandidateTable:
-    """The table of the same candidates; a check answers for a candidate by its direction and offset."""
+    """The table of drawn candidates; its check identifies a candidate by direction and offset."""
     rows = dict(zip(zip(own.direction.tolist(), own.offset.tolist(), strict=True), own.same.tolist(), strict=True))
 
     def answer(remainder: None, limits: Bounds, step_mm: float, direction: Ints, offset: Floats) -> Feasibility:
@@ -107,7 +107,7 @@ def table_of(own: Drawn, least_gain_mm2: float = 0.0) -> CandidateTable:
 def without_alike(
     tables: Sequence[Drawn], ordered: Sequence[Place], least_mm3: float = 0.0, most_mm3: float = np.inf
 ) -> list[Place]:
-    """Of (table, row) in order those that can be cut, and of near-equal planes of a table the first."""
+    """The feasible candidates among ordered (table, row), and only the first of near-equal planes of a table."""
     taken: list[Place] = []
     for index, row in ordered:
         own = tables[index]
@@ -124,7 +124,7 @@ def places(tables: Sequence[CandidateTable], candidates: Sequence[RankedCandidat
 
 
 def by_trade_off(tables: Sequence[Drawn], weight: float, least_gain: float = 0.0) -> list[Place]:
-    """Rows of all tables by what they gain less what they leave, table by table without near-equal ones, then together."""
+    """Rows of all tables by gain less residual: near-equal ones dropped within each table, then merged."""
     kept = []
     for index, own in enumerate(tables):
         rows = [row for row in range(len(own.gain)) if own.gain[row] >= least_gain]
@@ -161,7 +161,8 @@ def test_a_shortlist_has_the_first_few_by_each_trade_off_once(seed: int) -> None
 
 
 def classic(tables: Sequence[Drawn], preferred: float, least_reduction: float) -> list[Place]:
-    """Round by round: what its threshold lets in first and reduces at least as much as the best of the rounds before."""
+    """The classic order by rounds: the candidates first admitted by a threshold that reduce at least as much as the best of
+    the previous rounds."""
     spans = [(preferred, np.inf), (0.0, preferred)] if preferred > 0.0 else [(0.0, np.inf)]
     ranked = []
     for low, high in spans:
@@ -180,7 +181,8 @@ def classic(tables: Sequence[Drawn], preferred: float, least_reduction: float) -
 
 
 def _by_reduction(tables: Sequence[Drawn], index: int, row: int) -> tuple[float, float, int, int, int]:
-    """Where a candidate stands in its round: the larger part, which begins lower, first among those that reduce alike."""
+    """Sort key of a candidate within its round: the greatest reduction first; of equal ones the larger part, which begins
+    lower."""
     own = tables[index]
     return -_reduction(tables, index, row), float(own.offset[row]), index, int(own.direction[row]), row
 

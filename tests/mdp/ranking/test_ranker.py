@@ -1,4 +1,4 @@
-"""LearnedRanker: a learned ranker, its file, and what it does to a search."""
+"""LearnedRanker: its file, and its effect on a search."""
 
 import subprocess
 import sys
@@ -27,7 +27,7 @@ def _problem(width: int = 1, shape: str = "branch") -> Problem:
 
 
 class ByColumn(LearnedRanker):
-    """A network in whose place stands a plain sum, so that the order it must give is known."""
+    """A ranker with a plain sum in place of its network, so that the expected order is known."""
 
     def __init__(self, column: str) -> None:
         super().__init__(Path("none.onnx"))
@@ -128,7 +128,7 @@ def test_the_published_search_follows_the_plain_best_beside_what_a_learned_ranke
 
 
 class LastFirst(LearnedRanker):
-    """A learned ranker that likes best what the classic ranking likes least."""
+    """A learned ranker that prefers the last choice of the classic ranking."""
 
     def rank(self, offered: Iterable[RankedCandidate]) -> Iterator[RankedCandidate]:
         return reversed(list(offered))

@@ -1,4 +1,4 @@
-"""Which planes are too alike for both to count."""
+"""Planes that are too similar for both to count."""
 
 import numpy as np
 import pytest
@@ -29,7 +29,8 @@ def test_a_turn_of_18_degrees_tells_planes_apart() -> None:
 
 
 def test_no_two_directions_look_opposite_ways_unless_they_may_be_lower_than_nine_degrees() -> None:
-    """So the authors' rule, which takes the absolute value, comes to the same in all searches as they are set."""
+    """Therefore the authors' rule, which takes the absolute value, gives equal results in all searches with the default
+    directions."""
     spread = directions(load().search)
     assert (spread @ spread.T).min() > -SAME_COSINE
     assert _lowest(9.1, 0.0) @ _lowest(9.1, 180.0) > -SAME_COSINE > _lowest(9.0, 0.0) @ _lowest(9.0, 180.0)

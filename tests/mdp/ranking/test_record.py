@@ -14,14 +14,14 @@ MODEL = Model(risky_mm2=200.0, volume_mm3=1000.0, radius_mm=10.0)
 
 
 def offer(parent: str, gain_mm2: float, relaxed: int = 0) -> Offer:
-    """A horizontal candidate whose offset and M1 tell it apart: offset gain_mm2, M1 gain_mm2 / 200."""
+    """A horizontal candidate identified by its offset gain_mm2 and its M1, gain_mm2 / 200."""
     row = np.arange(len(COLUMNS)) / 100.0
     row[0] = gain_mm2 / 200
     return Offer(parent, Plane(np.array([0.0, 0.0, 1.0]), gain_mm2), row, relaxed)
 
 
 def trace() -> Trace:
-    """Model -> a (100), b (120), c (90, left behind); a -> d (20) and e (60); b -> the twin of d."""
+    """Model -> a (100), b (120), c (90, dropped); a -> d (20) and e (60); b -> the twin of d."""
     search = Trace("figure.stl", MODEL, "model")
     search.begin_stage(["model"])
     first = [(0, "a", 100.0), (2, "b", 120.0), (3, "c", 90.0)]

@@ -1,4 +1,4 @@
-"""Really broken files: each ends in a valid solid of a known size or in a sentence that says what is wrong."""
+"""Broken files from practice: each gives a valid solid of a known size, or a message that names the defect."""
 
 import csv
 
@@ -11,7 +11,7 @@ from profiles.errors import MeshError
 from tests.checks import assert_closed
 from tests.mdp.files import SHARED
 
-SOLID = {  # file: (scale, volume in mm3, words of a note or nothing)
+SOLID = {  # file: (scale, volume in mm3, words of a note or "")
     "bunny_holes.ply": (1000.0, 752_663, "filled 5 small holes"),
     "castle_wall_doubled.stl": (1.0, 9_645.6, "left out 10008 duplicate faces"),
     "chair_model.obj": (100.0, 6_463.9, "duplicate faces"),
@@ -29,7 +29,7 @@ SOLID = {  # file: (scale, volume in mm3, words of a note or nothing)
     "unit_meters.3mf": (1.0, 10 * 20 * 30, ""),
     "z_lower_right.stl": (1.0, 72_517.6, "turned 2 faces over"),
 }
-REFUSED = {  # file: (scale, words of the sentence)
+REFUSED = {  # file: (scale, words of the message)
     "chair_model.obj": (1.0, "largest extent is 0.6638 mm"),
     "ferrari_458_part.stl": (1.0, "not orientable"),
     "filament_guide_dup_faces.stl": (1.0, "open edges"),

@@ -1,4 +1,4 @@
-"""Colours follow the faces of a file through scaling, turning and repair."""
+"""Colours stay with the faces of a file through scaling, turning and repair."""
 
 from pathlib import Path
 
@@ -20,7 +20,7 @@ def _painted(mesh: Mesh, colours: object) -> Surface:
 
 
 def _areas_mm2(solid: Surface, colours: object) -> dict[int, float]:
-    """The area of every colour."""
+    """Total area of each colour."""
     mesh, of = Mesh(solid.vertices, solid.faces.astype(np.int32)), np.asarray(colours)
     return {int(colour): round(float(mesh.areas_mm2[of == colour].sum()), 6) for colour in np.unique(of)}
 
@@ -91,7 +91,7 @@ def test_pieces_of_painted_faces_are_found_as_by_trying_all_of_them() -> None:
 
 
 def lies_on(piece: Floats, triangle: Floats) -> bool:
-    """Whether a piece's middle lies on a triangle of about its direction: barycentric coordinates by least squares."""
+    """Whether a piece's centre lies on a triangle of nearly the same direction: barycentric coordinates by least squares."""
     sides, place = (triangle[1:] - triangle[0]).T, piece.mean(axis=0) - triangle[0]
     shares, *_ = np.linalg.lstsq(sides, place, rcond=None)
     normals = [np.cross(each[1] - each[0], each[2] - each[0]) for each in (piece, triangle)]

@@ -1,4 +1,4 @@
-"""Repair of small shapes with one known damage each, judged by closed formulas and by manifold3d."""
+"""Repair of small shapes with one known defect each, checked by closed formulas and by manifold3d."""
 
 from collections.abc import Callable
 
@@ -21,7 +21,7 @@ from tests.shapes import ball, bowl, box, branch, from_manifold, hollow, tee
 
 
 def soup(mesh: Mesh) -> Surface:
-    """The mesh as an STL file holds it: three vertices of its own for every face."""
+    """The mesh as an STL file holds it: every face has three vertices of its own."""
     return Surface(mesh.vertices[mesh.faces.ravel()], np.arange(mesh.faces.size).reshape(-1, 3))
 
 
@@ -217,7 +217,7 @@ def test_a_gap_as_wide_as_rounding_is_closed_but_a_wide_one_is_not() -> None:
 def test_a_body_that_passes_through_itself_counts_once(lean_deg: int) -> None:
     ring = m3.Manifold.extrude(m3.CrossSection.square((10, 10)), 180).refine(36)
 
-    def bent(points: Floats) -> Floats:  # once and a quarter around: the last quarter lies within the first
+    def bent(points: Floats) -> Floats:  # once and a quarter around: the last quarter overlaps the first
         turn = points[:, 2] * np.radians(450) / 180
         radius = 10 + points[:, 0]
         return np.stack([radius * np.cos(turn), radius * np.sin(turn), -points[:, 1]], axis=1)

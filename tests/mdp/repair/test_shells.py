@@ -1,4 +1,4 @@
-"""Shells about a point."""
+"""Shells around a point."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ def test_winding_about_a_point_counts_the_shells_around_it() -> None:
 
 
 def in_rows(mesh: Mesh, count: int) -> Surface:
-    """The same body so many times, in rows of fifty."""
+    """A number of copies of one body, in rows of fifty."""
     size = mesh.bounds_mm[1] - mesh.bounds_mm[0]
     places = np.stack([np.arange(count) % 50, np.arange(count) // 50, np.zeros(count)], axis=1) * 2.0 * size
     vertices = (mesh.vertices[None] + places[:, None]).reshape(-1, 3)

@@ -1,4 +1,4 @@
-"""Beam: what its slots follow."""
+"""Beam: the nodes that its slots expand."""
 
 import numpy as np
 import pytest
@@ -56,7 +56,7 @@ def test_a_trade_off_is_the_order_of_a_plain_sort(trade_off: float) -> None:
 
 
 def _sorted_plainly(table: CandidateTable, trade_off: float) -> list[int]:
-    """Feasible rows by falling score, each unless it is too like one before."""
+    """Feasible rows by falling score, without those too similar to an earlier one."""
     everything = np.arange(len(table.reason), dtype=np.int32)
     table.check_rows(everything)
     cost = trade_off * table.scored.lost_mm2 - table.scored.gain_mm2

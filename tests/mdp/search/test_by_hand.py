@@ -1,4 +1,4 @@
-"""Planes by hand: cut as they are, completed or refused with the reason; plans cut again without a search."""
+"""User-defined planes: cut as given, completed, or refused with the reason; plans cut again without a search."""
 
 import re
 from dataclasses import replace
@@ -67,7 +67,7 @@ def test_the_plan_of_a_search_gives_its_parts_again_bit_by_bit(tmp_path: Path, n
     assert [(row.parts, row.chosen) for row in again.front] == [(row.parts, row.chosen) for row in searched.front]
     assert [str(row.seam_mm) for row in again.front] == [
         str(row.seam_mm) for row in searched.front
-    ]  # letter for letter in a page
+    ]  # the text in a page is identical
     assert again.cost_mm2 == pytest.approx(searched.cost_mm2)
 
 
@@ -79,7 +79,7 @@ def _two_arms() -> Mesh:
 
 @cache
 def _searched_arms() -> Decomposition:
-    """What the search finds for a post with two arms, searched once for all tests."""
+    """The search's decomposition of a post with two arms, computed once for all tests."""
     return decompose(_two_arms(), "shape", _profile())
 
 
@@ -290,7 +290,7 @@ def test_seams_keep_out_of_a_zone_where_they_weigh_a_hundred_times() -> None:
 
 
 def _painted_tee() -> Mesh:
-    """A tee in triangles of some 5 mm: the underside of one arm is red, the head green, the rest blue."""
+    """A tee of triangles of about 5 mm: the underside of one arm is red, the head green, the rest blue."""
     tee = shapes.from_manifold(solid_of(shapes.tee()).refine_to_length(5.0))
     middles = tee.vertices[tee.faces].mean(axis=1)
     under = (tee.normals[:, 2] < -0.9) & (middles[:, 0] < -6.0)
@@ -350,12 +350,12 @@ def test_the_published_search_starts_from_planes_by_hand_too() -> None:
 
 
 POST_MM = (4.0, 6.0)
-# The post's corner bears the stresses of both axes: M / (b h^2 / 6) and M / (h b^2 / 6), as the sides of a right angle.
+# The post's corner bears the stresses of both axes, M / (b h^2 / 6) and M / (h b^2 / 6); their root sum of squares counts.
 STRESS_PER_NMM = float(np.hypot(6.0 / (4.0 * 6.0**2), 6.0 / (6.0 * 4.0**2)))
 
 
 def _post(length_mm: float) -> Mesh:
-    """A post on a plate 5 mm thick, so long above z = 6."""
+    """A post on a plate 5 mm thick, length_mm long above z = 6."""
     plate = m3.Manifold.cube((40, 40, 5), True).translate((0, 0, 2.5))
     return shapes.standing(plate + m3.Manifold.cube((*POST_MM, 6.0 + length_mm), True).translate((0, 0, 3.0 + length_mm / 2)))
 

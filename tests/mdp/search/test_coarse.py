@@ -1,4 +1,5 @@
-"""Coarse copy: a finely meshed model is searched on a copy near to it, cut itself, and costs about what its own search finds."""
+"""Coarse copy: a finely meshed model is searched on a simplified copy, cut itself, and costs about as much as in its own
+search."""
 
 from collections.abc import Sequence
 
@@ -30,7 +31,7 @@ def _profile(faces: int, *settings: str) -> Profile:
 
 
 def _fine(bumps_mm: float = 0.02, edges_mm: float = 0.7) -> Mesh:
-    """A post with a leaning arm, its surface wavy, of some 30,000 faces; edges_mm: how long edges may be before they are bent."""
+    """A post with a leaning arm and a wavy surface, about 30,000 faces; edges_mm: longest edges before the waves are applied."""
 
     def wavy(points: Floats) -> Floats:
         waves: Floats = bumps_mm * np.sin(2.0 * points[:, [1, 2, 0]])
@@ -62,7 +63,7 @@ def test_the_coarsest_copy_is_one_that_keeps_half_the_faces_a_model_may_have(fin
 
 
 def _farthest_mm(one: Mesh, other: Mesh) -> float:
-    """How far a hundred vertices of a mesh lie from another mesh, at most."""
+    """The greatest distance of about a hundred vertices of a mesh from another mesh."""
     triangles, places = other.vertices[other.faces], one.vertices[:: len(one.vertices) // 100]
     nearest = (trimesh.triangles.closest_point(triangles, np.tile(place, (len(triangles), 1))) - place for place in places)
     return max(float(np.linalg.norm(off, axis=1).min()) for off in nearest)
@@ -88,7 +89,7 @@ def test_a_copy_that_spares_few_faces_is_not_used() -> None:
 
 
 def test_the_model_itself_is_cut_for_about_the_cost_that_its_own_search_finds() -> None:
-    fine = _fine(0.005, 1.5)  # the slopes of higher bumps count as stairs, which the copy has none of
+    fine = _fine(0.005, 1.5)  # the slopes of higher bumps count as stair-stepping, which the copy does not have
     copied, itself = (decompose(fine, "shape", _profile(faces)) for faces in (3000, 0))
     assert len(copied.parts) == len(itself.parts) == 2
     assert copied.mesh is fine

@@ -1,4 +1,4 @@
-"""What a decomposition costs does not depend on where a model stands, how large it is, or which hand it has."""
+"""The cost of a decomposition does not depend on a model's position, scale or handedness."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ MODELS = [
     pytest.param(shapes.branch(), 2, id="branch"),
     pytest.param(random_solid(3), 4, id="solid"),
 ]
-ELSEWHERE = 0.02  # planes are sampled at other places of a model that is moved, turned or mirrored
+ELSEWHERE = 0.02  # planes are sampled at other positions of a model that is moved, turned or mirrored
 
 
 def cut(mesh: Mesh, parts: int, *keys: str) -> Decomposition:
@@ -46,8 +46,8 @@ def test_a_model_costs_the_same_within_2_percent_wherever_it_stands_on_the_platf
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("scale", [1.25, 1.5])
 def test_published_costs_grow_with_the_square_of_all_lengths(seed: int, scale: float) -> None:
-    """Those of the model, of the search and of what carries itself between its sides; a chamfer that still stands on the platform
-    (0.3 mm) does not grow with them, so factors are small."""
+    """All lengths of the model, of the search and of the longest self-supporting spans; a chamfer that may still touch the
+    build plate (0.3 mm) does not scale with them, so the factors are small."""
     mesh = random_solid(seed)
     lengths_mm = {
         "search.offset_step_mm": 0.5,

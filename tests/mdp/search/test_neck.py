@@ -1,4 +1,4 @@
-"""The neck near a plane: known in closed form, sought by brute force, and none where there is none."""
+"""The neck near a plane: known in closed form, found by brute force, and absent from models without one."""
 
 from itertools import product
 from math import cos, pi, radians, sin
@@ -20,7 +20,7 @@ Z = np.array([0.0, 0.0, 1.0])
 
 
 def lathe(radii_mm: Floats, heights_mm: Floats, wide: float = 1.0) -> Mesh:
-    """Rings of these radii at these heights, closed with caps; wide: as much wider along x."""
+    """Rings of given radii at given heights, closed with caps; wide: scale along x."""
     angles = 2.0 * pi * np.arange(ROUND) / ROUND
     rings = [
         np.column_stack([wide * r * np.cos(angles), r * np.sin(angles), np.full(ROUND, z)])

@@ -1,4 +1,4 @@
-"""Orientation and parts are chosen together, by what both cost with their time."""
+"""Joint choice of orientation and parts by their cost, including time."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -53,9 +53,9 @@ def test_a_tee_is_laid_on_its_side_where_nothing_needs_support() -> None:
     oriented = found(tee())
     assert oriented.orientation is not None
     assert (len(oriented.decomposition.parts), oriented.decomposition.cost_mm2) == (1, 0.0)
-    surface_mm2 = 2 * 700.0 + 160.0 * 10.0  # of a T of 7 cm2 that is 10 mm thick
+    surface_mm2 = 2 * 700.0 + 160.0 * 10.0  # surface of a T of 7 cm2, 10 mm thick
     flat_mm2 = 0.1 * 10.0 * 10.0 + 100.0 + 0.055 * surface_mm2  # 100 s, a metre, turned
-    assert oriented.total_mm2 == pytest.approx(flat_mm2, rel=0.02)  # hardly anything for its stance
+    assert oriented.total_mm2 == pytest.approx(flat_mm2, rel=0.02)  # its stance counts hardly anything
 
 
 def test_what_lies_best_stays_as_it_stands() -> None:
@@ -72,14 +72,14 @@ def test_laid_down_it_costs_no_more_than_in_one_piece_as_it_stands(mesh: Mesh) -
 def test_a_model_stays_where_turning_it_saves_less_than_it_counts(monkeypatch: pytest.MonkeyPatch) -> None:
     standing = decompose(tee(), "mesh", PROFILE, SearchRequest(price=by_height(PROFILE))).front[0]
     footing_mm2 = forecast_orientations(tee(), PROFILE, by_height)[0].footing_mm2
-    saved_mm2 = total_mm2(standing, Weights.of(PROFILE)) + footing_mm2 - 110.0  # of 100 s and a metre
+    saved_mm2 = total_mm2(standing, Weights.of(PROFILE)) + footing_mm2 - 110.0  # for 100 s and a metre
     for share, turned in ((0.9, True), (1.1, False)):
         monkeypatch.setattr(orient, "TURNED", share * saved_mm2 / 3000.0)
         assert (found(tee()).orientation is not None) == turned
 
 
 def leaning_plate() -> Mesh:
-    """A plate of 40 x 30 x 4 mm that leans on one edge by 30 degrees, the edge cut level to stand on."""
+    """A plate of 40 x 30 x 4 mm that leans by 30 degrees on one edge, which is cut level to stand on."""
     turn = about(np.array([0.0, 1.0, 0.0]), np.radians(30.0))
     return set_on_plate(box(40, 30, 4), turn)
 
@@ -93,7 +93,7 @@ def test_of_two_ways_to_lie_that_need_no_support_the_one_without_stairs_is_taken
 
 
 def searches(mesh: Mesh, price_by: Callable[[Profile], Pricing]) -> tuple[Oriented, int]:
-    """How a mesh is laid down, and how many searches that took."""
+    """The chosen orientation of a mesh, and the number of searches that it took."""
     searched: list[Mesh] = []
 
     def search(mesh: Mesh) -> Decomposition:
@@ -112,7 +112,7 @@ def test_what_can_be_told_without_a_search_is_not_searched() -> None:
 
 def test_what_is_searched_in_vain_is_compared_with_how_it_stands() -> None:
     def surprised(profile: Profile) -> Pricing:
-        bare = profile.process.support == "none"  # a forecast's
+        bare = profile.process.support == "none"  # a profile of a forecast
         return lambda parts: by_height(profile)(parts) if bare or np.ptp(parts[0].mesh.vertices[:, 2]) > 39 else None
 
     oriented, count = searches(tee(), surprised)
@@ -121,7 +121,7 @@ def test_what_is_searched_in_vain_is_compared_with_how_it_stands() -> None:
 
 def test_a_way_that_ends_dearer_than_good_cuts_would_leave_it_is_compared_with_how_it_stands() -> None:
     upright = forecast_orientations(tee(), PROFILE, by_height)[0]
-    hoped_mm2 = (upright.forecast_mm2 + upright.optimistic_mm2) / 2.0  # less than the forecast, and no certainty
+    hoped_mm2 = (upright.forecast_mm2 + upright.optimistic_mm2) / 2.0  # less than the forecast, but not certain
     more_s = (hoped_mm2 - found(tee()).total_mm2) / PROFILE.search.second_mm2
 
     def slow_when_low(profile: Profile) -> Pricing:
@@ -137,7 +137,7 @@ def test_a_way_that_ends_dearer_than_good_cuts_would_leave_it_is_compared_with_h
 
 
 def on_a_small_plate(profile: Profile) -> Pricing:
-    """The same printer with a plate for bases up to 20 mm wide."""
+    """A printer that takes 10 s per mm of height, with a plate for bases up to 20 mm wide."""
 
     def price(parts: Sequence[Part]) -> Price | None:
         vertices = parts[0].mesh.vertices
@@ -154,7 +154,7 @@ def test_no_orientation_is_taken_that_the_machine_has_no_room_for() -> None:
 
 def test_a_model_that_cannot_be_printed_as_it_stands_once_it_is_searched_is_found() -> None:
     def too_high(profile: Profile) -> Pricing:
-        bare = profile.process.support == "none"  # a forecast's
+        bare = profile.process.support == "none"  # a profile of a forecast
         return lambda parts: by_height(profile)(parts) if bare or np.ptp(parts[0].mesh.vertices[:, 2]) < 39 else None
 
     oriented, _ = searches(tee(), too_high)
@@ -187,7 +187,7 @@ def test_orientations_are_15_degrees_apart_from_each_other_and_from_that_of_the_
 
 @pytest.mark.parametrize("pedestal_mm", [0.0, 5.0])
 def test_what_the_plate_does_not_hold_costs_half_its_surface(pedestal_mm: float) -> None:
-    """A needle, held neither by its brim nor by a pedestal, lies down."""
+    """A needle that neither its brim nor a pedestal can hold lies on its side."""
     profile = load(settings=["search.directions=20", "search.polish=false", f"search.pedestal_mm={pedestal_mm}"])
     needle = mesh_of(m3.Manifold.cylinder(150.0, 1.0, 1.0, 32))
     upright, *others = forecast_orientations(needle, profile, by_height)
@@ -198,7 +198,7 @@ def test_what_the_plate_does_not_hold_costs_half_its_surface(pedestal_mm: float)
 
 
 def stance_mm2(x_mm: float, y_mm: float, height_mm: float, surface_mm2: float) -> float:
-    """What an unsteady block counts: 1 N at its top, pushed over a corner of its base and a brim of 5 mm with sharp corners."""
+    """Cost of an unsteady block: 1 N at its top towards a corner of its base and a brim of 5 mm with sharp corners."""
     x, y = x_mm + 10.0, y_mm + 10.0
     tension_mpa = height_mm * np.hypot(6.0 / (x * y**2), 6.0 / (y * x**2)) - 1.24e-6 * 9.81 * x_mm * y_mm * height_mm / (x * y)
     return float(0.06 * tension_mpa / 0.05 * surface_mm2)
@@ -225,7 +225,7 @@ def mushroom() -> m3.Manifold:
 
 
 def block_above() -> m3.Manifold:
-    """All that is above the plane z = 0."""
+    """The half-space above the plane z = 0."""
     return m3.Manifold.cube((100.0, 100.0, 100.0), True).translate((0.0, 0.0, 50.0))
 
 
@@ -237,7 +237,7 @@ def lowest_z(mesh: Mesh) -> float:
 def test_a_model_that_stands_on_a_face_is_not_turned_onto_a_rounded_end() -> None:
     assert lowest_z(mesh_of(mushroom())) > -0.5
     thin = mushroom() ^ (m3.Manifold.cylinder(30.0, 4.0, 4.0, 64).translate((0.0, 0.0, -30.0)) + block_above())
-    assert lowest_z(mesh_of(thin)) == pytest.approx(-1.0)  # its stem touches with 4 % of the shadow: no face
+    assert lowest_z(mesh_of(thin)) == pytest.approx(-1.0)  # its stem touches with 4 % of the shadow: too little
     assert lowest_z(mesh_of(mushroom().trim_by_plane((0.0, 0.0, -1.0), -17.0))) == pytest.approx(-1.0)  # onto a flat top
 
 
@@ -277,7 +277,7 @@ def test_a_rounded_model_is_offered_straight_along_the_sides_of_its_file() -> No
     ups = np.array([other.rotation[2] for other in orient.straight_orientations(leaning, 45.0)])
     for side in ([1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, -1]):
         assert (ups @ side).max() == pytest.approx(1.0)
-    assert (ups @ [0, 0, 1]).max() < 0.999  # as it stands is no other orientation
+    assert (ups @ [0, 0, 1]).max() < 0.999  # the given orientation is not listed as another one
 
 
 def test_every_further_part_is_charged_a_share_of_what_one_piece_costs() -> None:
@@ -288,7 +288,7 @@ def test_every_further_part_is_charged_a_share_of_what_one_piece_costs() -> None
     one = FrontRow((), 1000.0, 0.0, 1000.0, time_s=1000.0, filament_mm=1000.0)  # with time and filament 1200 mm2
     two = FrontRow((), 800.0, 0.0, 800.0, chosen=True, time_s=500.0, filament_mm=1000.0)
     oriented = orient_and_decompose(flat, PROFILE, by_height, lambda mesh: replace(halves, front=(one, two)))
-    assert oriented.total_mm2 == pytest.approx(800.0 + 0.1 * 500.0 + 100.0 + 0.03 * 1200.0, rel=0.005)  # and for its stance
+    assert oriented.total_mm2 == pytest.approx(800.0 + 0.1 * 500.0 + 100.0 + 0.03 * 1200.0, rel=0.005)  # plus its stance
 
 
 def test_where_the_plate_holds_a_model_in_no_orientation_all_are_forecast() -> None:
@@ -302,14 +302,14 @@ def test_where_the_plate_holds_a_model_in_no_orientation_all_are_forecast() -> N
 
 
 def axis_heights(mesh: Mesh) -> set[float]:
-    """How far upright the axis z of a body may come to lie, 0 to 1."""
+    """The values of abs(cos) between a body's axis z and the vertical in its orientations, 0 to 1."""
     return {round(abs(float(orientation.rotation[2, 2])), 3) for orientation in distinct_orientations(mesh, PROFILE)}
 
 
 def test_a_turned_body_stands_or_lies_along_its_axis(monkeypatch: pytest.MonkeyPatch) -> None:
     cup = m3.CrossSection([[(0.0, 0.0), (8.0, 0.0), (20.0, 30.0), (0.0, 30.0)]]).revolve(24)
     drum = m3.Manifold.cylinder(30.0, 20.0, 20.0, 48) - m3.Manifold.cylinder(30.0, 5.0, 9.0, 48)
-    assert 0.0 not in axis_heights(mesh_of(drum))  # it stands upright already
+    assert 0.0 not in axis_heights(mesh_of(drum))  # it is already upright
     sides = distinct_orientations(mesh_of(drum), PROFILE, for_person=True)
     assert any(abs(float(side.rotation[2, 2])) < 1e-6 for side in sides)
     lying = mesh_of(cup.rotate((90.0, 0.0, 0.0)))

@@ -1,4 +1,4 @@
-"""Plan files: what is written is read again, and what cannot be a plan is refused in one sentence."""
+"""Plan files: a written plan reads back equal, and an invalid one is refused in one sentence."""
 
 from dataclasses import replace
 from pathlib import Path

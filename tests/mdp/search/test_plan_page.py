@@ -1,4 +1,4 @@
-"""The example of docs/plan.md is a plan."""
+"""The example of docs/plan.md is a valid plan."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Polish: a sequence of cuts made shorter and better."""
+"""Polish: a sequence of cuts made shorter and cheaper."""
 
 import manifold3d as m3
 import numpy as np
@@ -21,7 +21,7 @@ ALONG_X = np.array([np.cos(np.radians(15.0)), 0.0, np.sin(np.radians(15.0))])
 
 
 def _problem(*settings: str) -> Problem:
-    """A tee whose undersides are safe only along directions less than 20 degrees above the horizon: one cut a side."""
+    """A tee whose undersides are safe only along directions less than 20 degrees above the horizon: one cut per side."""
     steep = (
         f"process.self_supporting_angle_deg={ANGLE_DEG}",
         "search.objective=risky",
@@ -94,7 +94,7 @@ def test_a_plane_a_hairs_breadth_from_the_origin_is_refused_and_one_through_it_i
     problem = _problem()
     beside, through = Plane(ALONG_X, 1e-17), Plane(ALONG_X, 0.0)
     assert not problem.allowed(problem.root, beside)
-    assert not problem.allowed(problem.root, through)  # it would cut the platform
+    assert not problem.allowed(problem.root, through)  # it would cut at the build plate
     assert problem.allowed(problem.root, _through(30.0, 9.0))
 
 
@@ -110,9 +110,9 @@ def test_cuts_that_are_nearly_symmetric_become_so_where_the_model_is() -> None:
     node = _after(problem, *askew)
     even = make_regular(problem, node, find_mirrors(problem.mesh))
     first, second = (cut.base for cut in even.cuts)
-    assert second.normal == pytest.approx(first.normal * [-1.0, 1.0, 1.0])  # each other's image across x
+    assert second.normal == pytest.approx(first.normal * [-1.0, 1.0, 1.0])  # mirror images of each other across x
     assert second.offset_mm == pytest.approx(first.offset_mm)
-    assert first.normal[1] == pytest.approx(0.0)  # and each its own across y
+    assert first.normal[1] == pytest.approx(0.0)  # and each symmetric across y
     assert even.cost_mm2 <= 1.01 * node.cost_mm2
 
 

@@ -36,7 +36,7 @@ def _decompose(mesh: Mesh, *settings_: str, machine: str = "generic_ac") -> Deco
 
 @cache
 def _found(name: str, *settings_: str, machine: str = "generic_ac") -> Decomposition:
-    """What the search finds for a named shape, searched once for all tests."""
+    """The search's decomposition of a named shape, computed once for all tests."""
     return _decompose(getattr(shapes, name)(), *settings_, machine=machine)
 
 
@@ -48,7 +48,8 @@ def test_a_leaning_arm_becomes_a_part_of_its_own_without_risk() -> None:
 
 
 def test_voids_forbid_no_cut() -> None:
-    """Arms with a void in each are cut as solid ones are, but for the stairs inside; the ceilings of 4 mm are bridged."""
+    """Arms with a void in each are cut like solid ones, except for the stair-stepping inside; the ceilings of 4 mm are
+    bridged."""
     solid, hollow = (_found(name, "search.stair_weight=0") for name in ("tee", "hollow_tee"))
     assert [tuple(part.direction) for part in hollow.parts] == [tuple(part.direction) for part in solid.parts]
     assert len(hollow.parts) == 2
@@ -97,7 +98,7 @@ def test_no_face_of_a_part_rests_on_air(seed: int) -> None:
 
 
 def _area_in_plane(mesh: Mesh, plane: Plane, looking: float) -> float:
-    """Area of the faces in a plane that look along its normal (1) or against it (-1)."""
+    """Area of the faces in a plane whose normals agree with it (1) or oppose it (-1)."""
     inside = np.abs(plane.heights_mm(mesh.vertices)[mesh.faces]).max(axis=1) < 1e-6
     return float(mesh.areas_mm2[inside & (mesh.normals @ plane.normal * looking > 0.5)].sum())
 
@@ -223,7 +224,7 @@ def test_ctrl_c_ends_the_search_and_what_it_had_begun(monkeypatch: pytest.Monkey
 
 def test_space_that_a_fold_winds_around_twice_is_reported_and_no_other_difference_is_allowed() -> None:
     decomposition = _found("tee")
-    folded = shapes.tee(arm=40.004)  # as if its volume counted 0.4 mm3 twice
+    folded = shapes.tee(arm=40.004)  # its volume seems to be 0.4 mm3 larger
     assert folded_mm3(decomposition.mesh, decomposition.parts) == 0.0
     assert folded_mm3(folded, decomposition.parts) == pytest.approx(0.4)
     allowed = Decomposition(**vars(decomposition) | {"mesh": folded, "folded_mm3": 0.4001})
@@ -306,7 +307,7 @@ def test_a_search_tells_that_it_begins_before_its_first_stage_and_where_nothing_
 
 
 def test_a_cut_through_the_bulk_of_a_model_is_made_only_on_demand() -> None:
-    """A thick lying slab with an overhanging rim all round is cut at its waist, which is as wide as it is."""
+    """A thick flat slab with an overhanging rim all round is cut at its waist, which is as wide as the slab."""
     slab = m3.Manifold.cube((40.0, 40.0, 30.0), True).translate((0.0, 0.0, 15.0))
     rimmed = slab + m3.Manifold.cube((60.0, 60.0, 30.0), True).translate((0.0, 0.0, 45.0))
     profile = load(settings=["search.directions=60", "search.clearance=false", "search.seam_mm=0.8"])

@@ -1,5 +1,5 @@
-"""Cuts that take single limbs off: found by the search, kept in plans, made by hand, and refused where the head would meet what
-stands."""
+"""Cuts that separate single limbs: found by the search, kept in plans, made by the user, and refused if the head would hit
+standing plastic."""
 
 from dataclasses import replace
 from functools import cache
@@ -41,7 +41,7 @@ def _by_hand(mesh: Mesh, part: PlannedPart) -> Decomposition:
 
 @cache
 def _searched() -> Decomposition:
-    """What the search finds for the bar beside the tower, searched once for all tests."""
+    """The search's decomposition of the bar beside the tower, computed once for all tests."""
     return decompose(shapes.bar_beside_a_tower(), "bar", _profile())
 
 
@@ -51,7 +51,7 @@ def test_a_bar_beside_a_tower_is_cut_off_alone_where_no_half_space_is_worth_it()
     assert [part.base.limbs_mm is None for part in limbs.parts] == [True, False]
     assert limbs.cost_mm2 < 0.95 * whole.cost_mm2
     assert limbs.parts[1].mesh.bounds_mm[1, 0] == pytest.approx(27.0)
-    assert limbs.parts[0].mesh.bounds_mm[1, 2] == pytest.approx(75.0)  # the tower stands
+    assert limbs.parts[0].mesh.bounds_mm[1, 2] == pytest.approx(75.0)  # the tower remains
 
 
 @pytest.mark.parametrize("terms", [{"objective": "risky"}, {"method": "published"}])
@@ -98,7 +98,7 @@ def test_a_limb_that_is_cut_off_already_is_not_taken_for_another_one() -> None:
 def test_a_trial_refuses_a_limb_that_would_leave_something_in_the_air() -> None:
     frame = m3.Manifold.cube((80, 40, 4)) + m3.Manifold.cube((8, 8, 40)) + m3.Manifold.cube((8, 8, 40)).translate((72, 0, 0))
     frame += m3.Manifold.cube((30, 8, 8)).translate((0, 0, 34)) + m3.Manifold.cube((8, 8, 10)).translate((22, 0, 25))
-    hook = shapes.from_manifold(frame)  # the end of the hook hangs down below the plane
+    hook = shapes.from_manifold(frame)  # the end of the hook hangs below the plane
     plane = PlannedPart((0.0, 0.0, 1.0), 30.0, limbs_mm=((0.0, 0.0, 42.0),)).plane
     assert plane is not None
     trial = Trials(hook, _profile(nozzle_load_n=0.0, fragile_mm=0.0)).attempt([plane])
@@ -206,7 +206,7 @@ def test_a_limb_moved_by_a_trial_keeps_its_point_and_its_figures_are_those_of_th
 
 def test_limbs_that_are_nearly_each_other_s_mirror_image_become_it() -> None:
     solid = m3.Manifold.cube((110.0, 30.0, 4.0), True).translate((0.0, 0.0, 2.0))
-    for x in (-35.0, 0.0, 35.0):  # with 33 sides no vertex lies at the image of another one
+    for x in (-35.0, 0.0, 35.0):  # with 33 sides, no vertex is the mirror image of another
         post, cap = m3.Manifold.cylinder(20.0, 4.0, 4.0, 33), m3.Manifold.cylinder(4.0, 9.0, 9.0, 33)
         solid += post.translate((x, 0.0, 2.0)) + cap.translate((x, 0.0, 20.0))
     mesh = shapes.from_manifold(solid)

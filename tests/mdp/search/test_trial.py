@@ -1,4 +1,4 @@
-"""Planes tried by hand: the same figures as the cuts have, whatever was tried before, and why a plane is refused."""
+"""Trial planes of the user: figures equal to those of real cuts, whatever was tried before, and the reason of each refusal."""
 
 import manifold3d as m3
 import numpy as np

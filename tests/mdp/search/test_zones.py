@@ -1,4 +1,4 @@
-"""What a person marks on a model, in a search: no support where none is wanted, faces around a point."""
+"""User zones in a search: regions without support, and faces around a point."""
 
 import pytest
 from manifold3d import Manifold

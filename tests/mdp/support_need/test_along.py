@@ -1,4 +1,4 @@
-"""Need along many directions: asked singly or all at once, mirrored, and of the faces that cuts leave of a model."""
+"""Need along many directions: one by one or all at once, mirrored, and for the faces left by cuts of a model."""
 
 import manifold3d as m3
 import numpy as np

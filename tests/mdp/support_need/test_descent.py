@@ -1,4 +1,4 @@
-"""What begins in mid-air: by a graph of the vertices that lie no higher than a layer shows, whatever the heights are."""
+"""Floating starts: checked by a graph of the vertices below a layer's resolution, at any heights."""
 
 from itertools import combinations
 
@@ -27,7 +27,7 @@ def begins_in_air(surface: LinkedFaces, heights: Floats, patch: Ints, base_mm: f
 
 
 def has_dip(surface: LinkedFaces, heights: Floats, patch: Ints, base_mm: float) -> bool:
-    """Whether some vertex of a patch is the lowest of all that hangs together with it within DIP_MM, and none of that rests."""
+    """Whether some vertex of a patch is the lowest of all vertices connected to it within DIP_MM, none of which rests."""
     whole = nx.Graph(edge for face in surface.faces.tolist() for edge in combinations(face, 2))
     for v in np.unique(surface.faces[patch]):
         low = [w for w in whole if heights[w] <= heights[v] + DIP_MM]

@@ -1,4 +1,4 @@
-"""What needs support: bridges, arches, ledges and spikes of known size, what lies beneath a mushroom's cap, one core and two."""
+"""Faces that require support: bridges, arches, ledges and spikes of known size, under a mushroom's cap, on one core and two."""
 
 import manifold3d as m3
 import numpy as np
@@ -21,7 +21,7 @@ TURN = st.floats(0.0, 360.0)
 
 
 def needing_mm2(solid: m3.Manifold) -> float:
-    """Area that needs support straight up on the platform."""
+    """Area that needs support upright on the build plate."""
     mesh = standing(solid)
     return float(mesh.areas_mm2[risky_upright(mesh, UP_DEG) & needs_support(mesh, PROCESS, True)].sum())
 
@@ -31,7 +31,7 @@ def block(x: float, y: float, z: float, at: tuple[float, float, float]) -> m3.Ma
 
 
 def bridge(length: float) -> m3.Manifold:
-    """A deck 8 mm wide over two pillars."""
+    """A deck 8 mm wide on two pillars."""
     pillars = [block(5, 8, 12, (side * (length + 5) / 2, 0, 0)) for side in (-1, 1)]
     return block(length + 10, 8, 3, (0, 0, 10)) + pillars[0] + pillars[1]
 
@@ -48,7 +48,7 @@ def ledge(depth: float) -> m3.Manifold:
 
 
 def hanging(piece: m3.Manifold) -> m3.Manifold:
-    """A table, and under its top, 20 mm over the platform, something that hangs down; the top bridges nothing, it is thick."""
+    """A table with a body hanging from its top, 20 mm over the build plate; the top is thick and bridges nothing."""
     return (
         block(4, 4, 20, (-4.8, 0, 0)) + block(4, 4, 20, (4.8, 0, 0)) + block(13.6, 4, 3, (0, 0, 20)) + piece.translate((0, 0, 20))
     )
@@ -122,7 +122,7 @@ def test_a_sheet_with_nothing_at_its_rim_has_no_anchor() -> None:
 
 
 def mushroom() -> Mesh:
-    """A stem under a cap whose underside is a cone nearly flat."""
+    """A stem under a cap with a nearly flat conical underside."""
     return standing(m3.Manifold.cylinder(20, 8, 8, 64) + m3.Manifold.cylinder(2, 8, 20, 64).translate((0, 0, 20)))
 
 

@@ -1,4 +1,4 @@
-"""What carries itself, on shapes of any size and turn: against closed formulas, against places looked at one by one, turned."""
+"""Self-supporting faces on shapes of any size and rotation: against closed formulas and point-by-point checks."""
 
 import manifold3d as m3
 import numpy as np
@@ -24,7 +24,7 @@ TURN = st.floats(0.0, 360.0)
 
 
 def needing_mm2(mesh: Mesh) -> float:
-    """Area that needs support straight up on the platform."""
+    """Area that needs support upright on the build plate."""
     return float(mesh.areas_mm2[risky_upright(mesh, UP_DEG) & needs_support(mesh, PROCESS, True)].sum())
 
 
@@ -68,7 +68,7 @@ def test_what_hangs_lowest_from_a_ceiling_begins_in_mid_air_however_little_it_ha
 
 
 def airy_share(mesh: Mesh, direction: Floats) -> Floats:
-    """(m,) how much of each face has nothing of the mesh beneath it, by 16 places of it against every face that looks up."""
+    """(m,) share of each face with nothing of the mesh beneath it, by 16 of its points against every face that points up."""
     shares = np.array([(i + 0.5, j + 0.5) for i in range(4) for j in range(4)]) / 4.0
     shares = np.where(shares.sum(axis=1, keepdims=True) > 1.0, 1.0 - shares, shares)
     weights = np.column_stack([1.0 - shares.sum(axis=1), shares])
@@ -84,7 +84,7 @@ def airy_share(mesh: Mesh, direction: Floats) -> Floats:
 
 
 def by_place(values: Floats, places: Floats, areas: Floats) -> Floats:
-    """(m,) means by area over the flat places that faces belong to."""
+    """(m,) area-weighted means over the flat regions of the faces."""
     total, area = np.bincount(places, values * areas), np.bincount(places, areas)
     means: Floats = total[places] / area[places]
     return means
@@ -106,7 +106,7 @@ def test_faces_over_air_are_those_below_which_no_face_looks_up(seed: int) -> Non
 
 
 def needing(mesh: Mesh, direction: Floats) -> Mask:
-    """(m,) which faces that overhang along a direction need support."""
+    """(m,) whether each face needs support among those that overhang along a direction."""
     classes = SupportNeed.of(mesh, PROCESS, 5.0).along(direction[None])[0]
     return facing_down(mesh, direction, UP_DEG) & (classes != CARRIES_ITSELF)
 

@@ -1,6 +1,6 @@
-"""Lines over a hanging place: rectangles by closed formulas, and every line drawn over places of any outline by shapely.
+"""Lines over a hanging region: rectangles by closed formulas, and every line over regions of any outline by shapely.
 
-Near anchors: triangles within reach of anchored sides, held against what shapely leaves of them outside that reach.
+Near anchors: triangles within reach of anchored sides, compared with the part that shapely leaves outside that reach.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ from mdp.support_need.spans import DEEP, Sides
 WIDTH_MM = 0.45
 TURN = st.floats(0.0, 360.0)
 REACH_MM = 0.9
-SLACK_MM = 0.06  # two places that are looked at are 0.1 mm apart
+SLACK_MM = 0.06  # sample points are 0.1 mm apart
 
 
 @njit
@@ -27,7 +27,7 @@ def spans(sides: Sides, area_mm2: float, longest_mm: float, width_mm: float) -> 
 
 
 def sides_of(hanging: Polygon, anchored: tuple[int, ...] | None = None) -> Sides:
-    """The sides of a place by their ends, which of them are anchors; None: all."""
+    """The sides of a region by their ends, and which of them are anchors; None: all."""
     corners = np.array(hanging.exterior.coords)
     ends: Floats = np.hstack([corners[:-1], corners[1:]])
     anchors = range(len(ends)) if anchored is None else anchored
@@ -38,7 +38,7 @@ def is_spanned(hanging: Polygon, longest_mm: float, anchored: tuple[int, ...] | 
     return spans(sides_of(hanging, anchored), hanging.area, longest_mm, WIDTH_MM)
 
 
-# The sides of shapely's box run up at x = 10, along y = 6, down at x = 0, back along y = 0.
+# The sides of shapely's box run up at x = 10, left along y = 6, down at x = 0, right along y = 0.
 @pytest.mark.parametrize(
     ("anchored", "length_mm"),
     [((0, 2), 10.0), ((1, 3), 6.0), ((0, 1, 2, 3), 6.0), ((0, 1), None), ((0,), None), ((0, 1, 2), 10.0), ((), None)],
@@ -54,7 +54,7 @@ def test_a_rectangle_is_spanned_between_two_opposite_sides_that_are_anchors(
 
 
 def longest_line_mm(hanging: Polygon, angle: float) -> float:
-    """The longest of lines 0.1 mm apart over a place in a direction."""
+    """The longest of lines 0.1 mm apart over a region in a direction."""
     level = affinity.rotate(hanging, -angle, origin=(0, 0))
     x0, y0, x1, y1 = level.bounds
     lines = [level.intersection(LineString([(x0 - 1, y), (x1 + 1, y)])) for y in np.arange(y0 + 0.05, y1, 0.1)]
@@ -66,10 +66,10 @@ def longest_line_mm(hanging: Polygon, angle: float) -> float:
 def test_no_place_is_spanned_over_which_lines_of_every_direction_are_too_long(seed: int, longest: float) -> None:
     rng = np.random.default_rng(seed)
     angles = np.sort(rng.uniform(0, 2 * np.pi, 9))
-    assume(np.diff(angles, append=angles[0] + 2 * np.pi).max() < 3.0)  # else the middle lies outside
+    assume(np.diff(angles, append=angles[0] + 2 * np.pi).max() < 3.0)  # otherwise the centre lies outside
     hanging = Polygon(rng.uniform(2.0, 9.0, (9, 1)) * np.column_stack([np.cos(angles), np.sin(angles)]))
     least = min(longest_line_mm(hanging, angle) for angle in range(0, 180, 10))
-    assume(abs(least - longest) > 0.15 * longest)  # lines are a width apart, angles 22 degrees
+    assume(abs(least - longest) > 0.15 * longest)  # lines are one width apart, angles 22 degrees
     if is_spanned(hanging, longest):
         assert least < longest
 
@@ -81,7 +81,7 @@ def test_a_disc_at_the_end_of_a_strip_is_not_spanned_though_most_lines_over_both
 
 
 def test_a_line_may_end_loose_over_a_fiftieth_of_a_place_and_no_more() -> None:
-    ends_mm = {0.0: True, 0.1: True, 0.5: False, 2.0: False}  # of 12 mm of a side that carry nothing
+    ends_mm = {0.0: True, 0.1: True, 0.5: False, 2.0: False}  # of 12 mm of a side without an anchor
     for loose, spanned in ends_mm.items():
         hanging = Polygon([(0, 0), (8, 0), (8, 12 - loose), (8, 12), (0, 12)])
         assert is_spanned(hanging, 9.0, (1, 4)) == spanned

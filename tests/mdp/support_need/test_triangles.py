@@ -1,4 +1,4 @@
-"""What needs support is asked of the shape: it is the same however a surface is cut into triangles."""
+"""Support need depends on the shape only: it is equal for every triangulation of a surface."""
 
 import manifold3d as m3
 import numpy as np
@@ -35,7 +35,7 @@ def box(x: float, y: float, z: float, size: tuple[float, float, float]) -> m3.Ma
 
 @st.composite
 def heaps(draw: st.DrawFn) -> m3.Manifold:
-    """The largest piece of some boxes."""
+    """The largest connected piece of some boxes."""
     heap = m3.Manifold()
     for _ in range(draw(st.integers(2, 5))):
         heap += box(draw(half_mm), draw(half_mm), draw(half_mm), (2 * draw(half_mm), 2 * draw(half_mm), draw(half_mm)))
@@ -44,7 +44,7 @@ def heaps(draw: st.DrawFn) -> m3.Manifold:
 
 @st.composite
 def decks(draw: st.DrawFn) -> m3.Manifold:
-    """A deck over two pillars, with ledges at its ends and ridges under its middle."""
+    """A deck on two pillars, with ledges at its ends and ridges under its middle."""
     length, width, height = draw(st.integers(3, 34)), 1.0 + draw(half_mm), 4.0 + draw(half_mm)
     deck = box(-3, 0, 0, (3, width, height)) + box(length, 0, 0, (3, width, height)) + box(-3, 0, height, (length + 6, width, 2))
     for _ in range(draw(st.integers(0, 3))):
@@ -84,7 +84,8 @@ def cut_otherwise(mesh: Mesh, seed: int) -> list[Mesh]:
 
 
 def areas_mm2(mesh: Mesh) -> Floats:
-    """What needs support upright, and along every direction what does and what of it no support can stand under."""
+    """Area that needs support upright, and along every direction the area that needs it and the part that no support can
+    reach."""
     need = SupportNeed.of(mesh, PROFILE.process, 5.0)
     risky = risky_upright(mesh, UP_DEG)
     chosen = [risky & needs_support(mesh, PROFILE.process, True), risky & need.upright, needing_upright(mesh, PROFILE)]
@@ -103,7 +104,7 @@ def test_the_same_area_needs_support_however_a_shape_is_cut_into_triangles(mesh:
 
 
 def costs_mm2(mesh: Mesh) -> Floats:
-    """What a search counts of a whole model above every offset, and what a cut would count too little."""
+    """Costs in a search of a whole model above every offset, and the excess that a cut misses."""
     pieces = ModelPieces(SupportNeed.of(mesh, PROFILE.process, 5.0), np.arange(len(mesh.faces), dtype=np.int32))
     remainder = Remainder(mesh, risky_upright(mesh, UP_DEG) & pieces.upright, pieces=pieces)
     swept = gains(remainder, DIRECTIONS, 0.73, threshold(UP_DEG))
@@ -121,7 +122,7 @@ def test_a_search_counts_the_same_however_a_shape_is_cut_into_triangles(mesh: Me
 
 
 def hanging_mm2(mesh: Mesh) -> list[float]:
-    """What of every layer the slicer supports."""
+    """Area of each layer that the slicer supports."""
     sections = sections_at(mesh, np.arange(0.13, float(mesh.bounds_mm[1, 2]), 0.2))
     return [overhang.hanging.area() for overhang in find_overhangs(sections)]
 

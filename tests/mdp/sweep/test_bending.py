@@ -1,4 +1,4 @@
-"""Bending: stress at the base of what lies above a plane against textbook sections."""
+"""Bending: stress at the base of the body above a plane, against textbook sections."""
 
 import manifold3d as m3
 import numpy as np
@@ -21,14 +21,14 @@ def _stress(solid: Solid, plane: Plane = LEVEL) -> float:
 
 
 def _beam(width_mm: float, depth_mm: float, length_mm: float) -> Solid:
-    """On a block whose top is at 5 mm."""
+    """A beam on a block whose top is at 5 mm."""
     return m3.Manifold.cube((40.0, 40.0, 5.0), True).translate((0.0, 0.0, 2.5)) + m3.Manifold.cube(
         (width_mm, depth_mm, 2.0 * length_mm), True
     ).translate((0.0, 0.0, 5.0))
 
 
 def test_a_beam_is_pushed_in_its_worst_direction() -> None:
-    # Over the diagonal: the stresses of both axes, L / (b h^2 / 6) and L / (h b^2 / 6), as the sides of a right angle.
+    # Over the diagonal: the root sum of squares of the stresses of both axes, L / (b h^2 / 6) and L / (h b^2 / 6).
     base = Plane(LEVEL.normal, 6.0)
     assert _stress(_beam(4.0, 6.0, 31.0), base) == pytest.approx(30.0 * np.hypot(6.0 / (4.0 * 36.0), 6.0 / (6.0 * 16.0)))
 
@@ -63,7 +63,7 @@ def _box(size_mm: float, x: float, y: float, z: float) -> Solid:
 
 
 def _corner_stress(lever_mm: float, width_mm: float, xx: float, yy: float) -> float:
-    """At the corner of a square section of that width about its centroid, its axes the principal ones."""
+    """Stress at the corner of a square section of that width about its centroid, in its principal axes."""
     return lever_mm * float(np.hypot(0.5 * width_mm / xx, 0.5 * width_mm / yy))
 
 
@@ -92,7 +92,7 @@ def test_a_hole_from_below_is_missing_from_the_section() -> None:
 
 
 def test_a_void_belongs_to_the_piece_around_it_and_what_is_loose_inside_hangs_on_nothing() -> None:
-    """Boxes in each other about one middle: solid, void, a second solid, its void."""
+    """Nested boxes about one centre: solid, void, a second solid, its void."""
     outer, inner = _box(40.0, 0, 0, 20) - _box(30.0, 0, 0, 20), _box(20.0, 0, 0, 20) - _box(10.0, 0, 0, 20)
     both = m3.Manifold.compose([outer, inner])
     tube = (20.0**4 - 10.0**4) / 12.0
@@ -110,7 +110,7 @@ def test_random_solids_are_stressed_as_their_exact_pieces(seed: int, height: int
 
 
 def _greatest_stress(mesh: Mesh, plane: Plane, fragment_mm: float) -> float:
-    """Every piece cut off exactly, the moments of its base face by face, pushed in 720 directions."""
+    """The greatest stress of all pieces: each cut off exactly, its base's moments summed by faces, pushed in 720 directions."""
     pieces = [mesh_of(piece) for piece in above(solid_of(mesh), plane).decompose() if piece.volume() > 0.0]
     tops = [float(plane.heights_mm(piece.vertices).max()) for piece in pieces]
     return max(
@@ -123,7 +123,7 @@ def _base_stress(piece: Mesh, plane: Plane) -> float:
     base = np.abs(plane.heights_mm(piece.vertices)[piece.faces]).max(axis=1) < 1e-7
     corners, areas = piece.vertices[piece.faces[base]] @ side.T, piece.areas_mm2[base]
     corners = corners - (areas[:, None] * corners.mean(axis=1)).sum(axis=0) / areas.sum()
-    middles = 0.5 * (corners + np.roll(corners, 1, axis=1))  # their mean is exact for what is quadratic
+    middles = 0.5 * (corners + np.roll(corners, 1, axis=1))  # their mean is exact for quadratic functions
     moments: Floats = np.einsum("f,fki,fkj->ij", areas / 3.0, middles, middles)
     turns = np.pi * np.arange(720) / 720
     pushes = np.linalg.solve(moments, np.stack([np.cos(turns), np.sin(turns)]))

@@ -1,4 +1,4 @@
-"""What a plane leaves of a triangle above it, beside clipped polygons."""
+"""The part of a triangle above a plane, against clipped polygons."""
 
 import numpy as np
 from hypothesis import given

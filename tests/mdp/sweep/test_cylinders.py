@@ -1,4 +1,4 @@
-"""Bores and pins found in twenty forms whose features are known, and what planes cut of them."""
+"""Bores and pins found in twenty forms with known features, and the ones that planes cut."""
 
 from typing import TypeAlias
 
@@ -29,7 +29,7 @@ def rod(diameter_mm: float, length_mm: float = 60.0, sides: int = 48) -> Solid:
 
 
 def slot(diameter_mm: float, length_mm: float) -> Solid:
-    """A hole with parallel sides and round ends."""
+    """A slot with parallel sides and round ends."""
     ends = [rod(diameter_mm).translate((side * length_mm / 2, 0, 0)) for side in (-1, 1)]
     return Solid.batch_hull(ends)
 
@@ -50,7 +50,7 @@ def torus() -> Solid:
 
 
 BORE, PIN = True, False
-# What each form has: bores and pins by their diameter.
+# The bores and pins of each form, by diameter.
 FORMS: dict[str, tuple[Solid, list[tuple[bool, float]]]] = {
     "block": (block(), []),
     "bore": (block() - rod(8), [(BORE, 8)]),

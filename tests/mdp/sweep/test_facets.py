@@ -19,7 +19,7 @@ def _layout(mesh: Mesh) -> Layout:
 
 
 def _turns(layout: Layout, heights: Floats) -> list[int]:
-    """How often the neighbours around each vertex change from higher to lower and back."""
+    """The number of changes between higher and lower neighbours around each vertex."""
     starts, neighbours = layout.starts, layout.neighbours
     rings = [neighbours[starts[v] : starts[v + 1]] for v in range(len(heights))]
     lower = [heights[ring] < heights[v] for v, ring in enumerate(rings)]

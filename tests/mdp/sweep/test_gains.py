@@ -1,4 +1,4 @@
-"""What a sweep counts of a piece of a model: each face clipped by hand, times what its model, its class and a person say."""
+"""Gains of a piece of a model in a sweep: each face clipped separately, weighted by its model, its class and the user's zones."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ SPHERE = st.tuples(st.integers(1, 999), st.integers(1, 999))
 
 
 def pieces_of(mesh: Mesh, seed: int) -> ModelPieces:
-    """Every face a piece of some face of the model or of none, an area on it counted any number of times."""
+    """Random sources: every face is a piece of some face of the model or of none, with a random area factor."""
     rng, m = np.random.default_rng(seed), len(mesh.faces)
     return ModelPieces(SupportNeed.of(mesh, PROCESS, WEIGHT), rng.integers(-1, m, m).astype(np.int32), rng.uniform(0, 9, m))
 
@@ -45,7 +45,7 @@ def test_areas_count_as_their_faces_and_classes_say(seed: int, place: tuple[int,
 
 
 def matching(mesh: Mesh, other: Mesh) -> np.ndarray:
-    """Of which face of another mesh each is the same."""
+    """Index of the equal face in another mesh."""
     middles, others = (solid.vertices[solid.faces].mean(axis=1) for solid in (mesh, other))
     return np.linalg.norm(middles[:, None] - others[None], axis=2).argmin(axis=1)
 

@@ -22,7 +22,7 @@ def _remainder(mesh: Mesh) -> Remainder:
 
 
 def _grid(directions: Floats, least_gain_mm2: float = 1.0, keep_mm: Floats | None = None) -> LimbGrid:
-    """A grid that allows everything: seams and cuts cost nothing, no limb is too small."""
+    """A grid without restrictions: seams and cuts cost nothing, no limb is too small."""
     count = len(directions)
     return LimbGrid(
         directions=directions,
@@ -39,7 +39,7 @@ def _grid(directions: Floats, least_gain_mm2: float = 1.0, keep_mm: Floats | Non
 
 
 def _found(mesh: Mesh, direction: Floats) -> tuple[Remainder, list[Plane]]:
-    """A solid and the planes of limbs that gain anything along a direction."""
+    """A solid and the planes of limbs with any gain along a direction."""
     remainder = _remainder(mesh)
     found = find_limbs(remainder, _grid(direction[None]), threshold(ANGLE_DEG))
     vertices = remainder.facets.mesh.vertices
@@ -73,7 +73,7 @@ def test_what_limbs_would_do_is_what_the_pieces_that_are_cut_off_measure(seed: i
 
 
 def two_posts() -> Mesh:
-    """A plate with two posts, 20 and 30 mm high, a bar on each: 10 x 4 mm2 of it overhangs on either side."""
+    """A plate with two posts, 20 and 30 mm high, each with a bar on top: it overhangs by 10 x 4 mm2 on either side."""
     posts = [m3.Manifold.cube((4, 4, high), True).translate((x, 0, high / 2)) for x, high in ((-15, 20), (15, 30))]
     bars = [m3.Manifold.cube((24, 4, 4), True).translate((x, 0, high - 2)) for x, high in ((-15, 20), (15, 30))]
     solid = m3.Manifold.cube((60, 20, 2), True).translate((0, 0, 1))

@@ -1,4 +1,4 @@
-"""Rays over the tree of boxes against every triangle looked at one by one, and distances against those of another library."""
+"""Rays through the tree of boxes against testing each triangle, and distances against another library."""
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from tests.mdp.solids import random_solid
 
 
 def nearest_mm(origin: Floats, ray: Floats, mesh: Mesh) -> float:
-    """How far along a ray the first face is met that looks along it; infinite: none is."""
+    """Distance along a ray to the first face whose normal agrees with it; infinite: none."""
     facing = mesh.normals @ ray >= OPPOSITE_COSINE
     normals, (first, second, third) = mesh.normals[facing], (mesh.vertices[mesh.faces[facing, k]] for k in range(3))
     along = np.einsum("ij,ij->i", first - origin, normals) / (normals @ ray)

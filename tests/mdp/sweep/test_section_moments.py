@@ -1,4 +1,4 @@
-"""Bending of plane sections: closed formulas, and every direction tried on an area laid out in small squares."""
+"""Bending of plane sections: closed formulas, and every direction tried on an area of small squares."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,8 @@ L_PROFILE = np.array([(0.0, 0.0), (12.0, 0.0), (12.0, 2.0), (3.0, 2.0), (3.0, 20
 
 
 def test_a_rectangle_gives_way_first_at_its_corner_in_an_oblique_direction() -> None:
-    """A moment at an angle t stresses the corner by cos t / (h b^2 / 6) + sin t / (b h^2 / 6): most of all t their hypotenuse."""
+    """A moment at an angle t stresses the corner by cos t / (h b^2 / 6) + sin t / (b h^2 / 6): at most their root sum of
+    squares."""
     about_weak, about_strong = 20.0 * 5.0**2 / 6.0, 5.0 * 20.0**2 / 6.0  # 83.3 and 333.3 mm3
     assert _modulus(_rectangle(5.0, 20.0)) == pytest.approx(1.0 / np.hypot(1.0 / about_weak, 1.0 / about_strong))
     assert _modulus(_rectangle(5.0, 20.0)) == pytest.approx(80.8, abs=0.05)
@@ -42,7 +43,7 @@ def test_an_l_profile_against_small_squares_in_all_directions() -> None:
     x, y = np.meshgrid(np.arange(0.05, 12.0, 0.1), np.arange(0.05, 20.0, 0.1))
     places = np.stack([x, y], axis=-1)[(x < 3.0) | (y < 2.0)]
     middle = places.mean(axis=0)
-    moments = 0.01 * ((places - middle).T @ (places - middle) + len(places) * 0.01 / 12.0 * np.eye(2))  # and each square's own
+    moments = 0.01 * ((places - middle).T @ (places - middle) + len(places) * 0.01 / 12.0 * np.eye(2))  # plus each square's own
     angles = np.pi * np.arange(3600) / 3600
     pushes = np.linalg.solve(moments, np.stack([np.cos(angles), np.sin(angles)]))
     assert _modulus(L_PROFILE) == pytest.approx(1.0 / np.abs((L_PROFILE - middle) @ pushes).max(), rel=1e-6)

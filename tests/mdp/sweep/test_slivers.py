@@ -33,7 +33,7 @@ def _thin(mesh: Mesh, direction: Floats, *offsets_mm: float) -> list[float]:
 
 
 def _on_block(*pieces: m3.Manifold) -> Mesh:
-    """A block of 30 x 20 x 10 mm with things on it."""
+    """A block of 30 x 20 x 10 mm with bodies on it."""
     return shapes.standing(sum(pieces, m3.Manifold.cube((30, 20, 10), True).translate((0, 0, 5))))
 
 

@@ -1,4 +1,4 @@
-"""Stairs: what the sweep, the forecast and the search count of them, against faces clipped and parts cut by hand."""
+"""Stair-stepping in the sweep, the forecast and the search, against clipped faces and parts after real cuts."""
 
 from math import cos, radians
 
@@ -55,7 +55,7 @@ def test_a_face_shows_no_steps_level_or_upright_and_the_highest_beside_level(lea
 
 
 def cut_by_hand(mesh: Mesh, planes: list[Plane]) -> float:
-    """The steps of the parts after cutting, faces in the planes of the cuts left out."""
+    """Stair-stepping of the parts after cutting, without the faces in the cut planes."""
     total_mm2, rest = 0.0, solid_of(mesh)
     planes = [*planes, Plane(UP, -1.0)]
     for position, plane in enumerate(planes):

@@ -29,7 +29,7 @@ def _gains_one(mesh: Mesh, direction: Floats) -> Gains:
 
 
 def _floating(solid: m3.Manifold) -> int:
-    """Pieces off the platform; manifold3d lists a closed void as a piece of negative volume."""
+    """Pieces off the build plate; manifold3d lists a closed void as a piece of negative volume."""
     return sum(1 for piece in solid.decompose() if piece.bounding_box()[2] > 0.3 and piece.volume() > 0)
 
 
@@ -60,7 +60,7 @@ def test_every_offset_equals_the_exact_cut(seed: int, place: tuple[int, int]) ->
 
 
 def _near(expected: float, scale: float) -> object:
-    """Equal to 1e-9 of itself, or to rounding of the sum that it is what is left of."""
+    """Equal to 1e-9 of its value, or to the rounding of the sum of that scale that it was computed from."""
     return pytest.approx(expected, rel=1e-9, abs=1e-12 * scale)
 
 
@@ -72,7 +72,7 @@ def _interface_mm2(part: m3.Manifold, plane: Plane) -> float:
 
 
 def _least_contact_area_mm2(part: m3.Manifold, plane: Plane) -> float:
-    """Least interface of the pieces at least FRAGMENT_MM high, or the part's when all of them are lower."""
+    """Least interface of the pieces at least FRAGMENT_MM high, or the part's if all of them are lower."""
     pieces = [piece for piece in part.decompose() if piece.volume() > 0]
     high = [piece for piece in pieces if plane.heights_mm(mesh_of(piece).vertices).max() >= FRAGMENT_MM]
     return min((_interface_mm2(piece, plane) for piece in high), default=_interface_mm2(part, plane))
@@ -126,7 +126,7 @@ def test_the_order_of_faces_and_vertices_in_memory_does_not_matter() -> None:
 
 
 def test_two_balls_that_touch_in_a_vertex_are_one_piece() -> None:
-    """A vertex with two rings of neighbours: what stands on it hangs together through it, as the mesh says."""
+    """A vertex with two rings of neighbours connects the pieces on it, as in the mesh."""
     top, bottom = shapes.octahedron(5.0), shapes.octahedron(5.0)
     vertices = np.concatenate([bottom.vertices, top.vertices + np.array([0, 0, 10.0])])
     faces = np.concatenate([bottom.faces, top.faces + len(bottom.vertices)])
@@ -143,7 +143,7 @@ def _remainder(mesh: Mesh) -> Remainder:
 
 
 def _contact_areas(mesh: Mesh, fragment_mm: float = 2.0) -> Floats:
-    """By offset, 1 mm apart, the first at 1 mm."""
+    """Contact areas by offset, 1 mm apart, the first at 1 mm."""
     areas: Floats = sweep(_remainder(mesh), UP, 1.0, fragment_mm=fragment_mm).contact_area_mm2[0]
     return areas
 

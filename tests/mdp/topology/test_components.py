@@ -1,4 +1,4 @@
-"""What hangs together over edges."""
+"""Components connected over edges."""
 
 import numpy as np
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Sections against closed formulas, against shapely, and against the volume they must add up to."""
+"""Sections against closed formulas, shapely, and the volume that they must add up to."""
 
 from collections.abc import Sequence
 
@@ -91,7 +91,7 @@ def test_an_open_mesh_is_refused_with_the_number_of_open_edges() -> None:
 
 
 def brute_force_area(mesh: Mesh, z: float) -> float:
-    """Every triangle cut by itself, the pieces put together by shapely."""
+    """Every triangle cut separately, the pieces joined by shapely."""
     pieces = []
     for triangle in mesh.vertices[mesh.faces]:
         ends = [

@@ -1,4 +1,4 @@
-"""Edges of any faces, oriented or not, counted one by one; faces across edges; sets that grow together, against a graph."""
+"""Edges of any faces, oriented or not, counted one by one; faces across edges; growing sets, against a graph."""
 
 from collections import Counter
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""What numbers of other slicers mean here."""
+"""The meaning of other slicers' numbers in our settings."""
 
 from collections.abc import Callable, Mapping
 
@@ -175,7 +175,7 @@ def test_layers_that_are_too_high_for_all_lines_are_refused() -> None:
 
 
 def reported(theirs: Config, name: str) -> Row:
-    """The one row of a report on a setting, by its name there."""
+    """The only row of a report on a setting, by its name in the other slicer."""
     (row,) = (row for kind in KINDS for row in imported(theirs, kind).rows if row.name == name)
     return row
 
@@ -275,7 +275,7 @@ def test_a_width_in_percent_of_what_the_file_does_not_tell_is_left_with_the_reas
         (cura.of_values, {"support_angle": "55", "raft_airgap": "0.3", "prime_tower_size": "20"}, ["prime_tower_size"]),
         (cura.of_values, {"retraction_hop": "0.2", "retraction_hop_enabled": "True"}, []),
         (cura.of_values, {"cool_fan_speed": "50", "cool_fan_enabled": "False"}, []),
-        (cura.of_values, {"speed_print": "80"}, []),  # four speeds follow from it
+        (cura.of_values, {"speed_print": "80"}, []),  # it sets four speeds
         (cura.of_values, {"wall_thickness": "1.2", "line_width": "0.4"}, []),
     ],
 )

@@ -1,4 +1,4 @@
-"""Cura's settings: those of the stacks in a project, formulas, and settings that another one switches."""
+"""Cura's settings: the stacks in a project, formulas, and settings enabled by others."""
 
 from pathlib import Path
 from zipfile import ZipFile
@@ -97,7 +97,7 @@ def test_a_material_inherits_from_the_shipped_one_that_its_kind_names(kind: str,
         ({"top_bottom_thickness": "1", "layer_height": "0.3"}, "top_solid_layers", 4),
         ({"top_layers": "=0 if infill_sparse_density == 100 else 5", "infill_sparse_density": "20"}, "top_solid_layers", 5),
         ({"speed_infill": "=resolveOrValue('speed_print')", "speed_print": "50"}, "infill_speed", 50),
-        ({"speed_infill": "=speed_print"}, "infill_speed", None),  # nothing says it
+        ({"speed_infill": "=speed_print"}, "infill_speed", None),  # nothing defines it
         ({"speed_infill": "=speed_wall_x", "speed_wall_x": "=speed_infill"}, "infill_speed", None),
         ({"speed_infill": "=open('a')"}, "infill_speed", None),
         ({"speed_infill": "=9 / 0"}, "infill_speed", None),

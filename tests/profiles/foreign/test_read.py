@@ -1,4 +1,4 @@
-"""Files of other slicers, told by what is in them."""
+"""Files of other slicers, recognised by their content."""
 
 import json
 import struct
@@ -98,7 +98,7 @@ def test_the_settings_at_the_end_of_gcode_are_read(tmp_path: Path) -> None:
 
 
 def gcode_of_prusaslicer_3(presets: object) -> str:
-    """The end of a G-code file with settings twice; the older form has the retraction that is the default."""
+    """The end of a G-code file with duplicate settings; the older form has the default retraction."""
     lines = json.dumps({"general": {"producer": "PrusaSlicer"}, "presets": presets, "stats": None}, indent=2).split("\n")
     block = "".join(f"; {line}\n" for line in lines)
     return (
@@ -248,7 +248,7 @@ def test_a_zip_of_something_else_is_refused(tmp_path: Path) -> None:
 
 
 def flipped(file: Path, member: str, text: str) -> Path:
-    """A zip of one member, the first bytes of whose deflated content are wrong."""
+    """A zip with one member, whose deflated content begins with wrong bytes."""
     with ZipFile(file, "w", ZIP_DEFLATED) as archive:
         archive.writestr(member, text)
     content, begin = bytearray(file.read_bytes()), 30 + len(member)
@@ -258,7 +258,7 @@ def flipped(file: Path, member: str, text: str) -> Path:
 
 
 def cut_short(file: Path, member: str, text: str) -> Path:
-    """A zip of one stored member that says to be 100 kB longer than the file has bytes."""
+    """A zip with one stored member whose stated size is 100 kB longer than the file."""
     with ZipFile(file, "w") as archive:
         archive.writestr(member, text)
     content = bytearray(file.read_bytes())

@@ -119,7 +119,7 @@ def test_no_parts_take_no_time() -> None:
 
 
 def star() -> Mesh:
-    """A twisted star that gets thinner, with a ring on its tip whose underside hangs."""
+    """A twisted star that gets thinner, with a ring on its tip whose underside overhangs."""
     turns = np.linspace(0.0, 2.0 * pi, 10, endpoint=False)
     corners = np.column_stack([np.cos(turns), np.sin(turns)]) * np.where(np.arange(10) % 2, 6.0, 14.0)[:, None]
     body = m3.Manifold.extrude(m3.CrossSection([corners]), 30.0, 30, 70.0, (0.5, 0.5))
@@ -141,7 +141,7 @@ def comb() -> Mesh:
 
 
 def tower() -> Mesh:
-    """A column with a wide head whose underside, far above the plate, stands on support."""
+    """A column with a wide head whose underside, far above the plate, needs support."""
     head = m3.Manifold.cube((30.0, 26.0, 5.0), True).translate((6.0, 0.0, 42.0))
     return standing(m3.Manifold.cylinder(40.0, 6.0, 6.0, 48) + head)
 
@@ -159,10 +159,10 @@ LEANING = ((0.3, 0.1, 0.95), 9.0)
     [
         (tower(), (), 0.3, 0.02),
         (thin_box(), (), 0.3, 0.02),
-        (box(24, 20, 40), (((0.3, 0.1, 0.95), 18.0),), 0.3, 0.05),  # under its slanted top skins are bridged in bursts of layers
+        (box(24, 20, 40), (((0.3, 0.1, 0.95), 18.0),), 0.3, 0.05),  # skins under its slanted top are bridged in bursts of layers
         (vase(), (LEANING,), 0.2, 0.03),
         (comb(), (LEANING,), 0.3, 0.03),
-        (star(), (), 0.3, 0.05),  # its many small places that hang get less support in thick layers
+        (star(), (), 0.3, 0.05),  # its many small overhangs get less support in thick layers
     ],
     ids=["tower on support", "thin box", "cut box", "cut vase", "cut comb", "star"],
 )

@@ -1,4 +1,4 @@
-"""What layers take roughly, and which of them stand for all."""
+"""Rough durations of layers, and the layers that represent all others."""
 
 from itertools import pairwise
 

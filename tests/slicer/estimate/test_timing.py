@@ -1,4 +1,4 @@
-"""Durations of strokes and travels, by the formulas of uniform acceleration and as the dry run has them."""
+"""Durations of strokes and travels, by the formulas of uniform acceleration and by the dry run."""
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ TIP = np.zeros(2)
 
 
 def seconds(*lines: Floats, retracts: bool = False, speed: float = 50.0, tip: Floats = TIP) -> float:
-    """Of walls along lines (n, 2), without the rise to their layer."""
+    """Seconds of walls along lines (n, 2), without the rise to their layer."""
     placed = [Bead(Kind.OUTER_WALL, line, 0.45, 0) for line in lines]
     strokes = strokes_of(placed, np.full(len(lines), retracts), {}, 0.0)
     return strokes_s(strokes, np.full(len(lines), speed), tip, PROFILE, False) - RISE_S
@@ -75,11 +75,11 @@ def test_a_loop_takes_as_long_as_a_body_that_is_everywhere_as_fast_as_it_may(see
 
 
 def integrated_s(points: Floats, speed: float, acceleration: float, corners_mm_s: Floats) -> float:
-    """Seconds along a line (n, 2) whose corners are passed no faster than that, summed over 40,000 short steps: everywhere as
-    fast as the speed allows and as can be had from, and got rid of until, every corner."""
+    """Seconds along a line (n, 2) with limited speeds at its corners, summed over 40,000 short steps: everywhere the highest
+    speed that the limit, and acceleration from and braking to every corner, allow."""
     sides = np.diff(points, axis=0)
     lengths = np.hypot(*sides.T)
-    ramps = acceleration * lengths / np.abs(sides).max(axis=1)  # the axis that moves most has the acceleration
+    ramps = acceleration * lengths / np.abs(sides).max(axis=1)  # the axis that moves most reaches the acceleration limit
     at, energy = np.concatenate([[0.0], np.cumsum(lengths)]), np.concatenate([[0.0], np.cumsum(2.0 * ramps * lengths)])
     places = (np.arange(40_000) + 0.5) / 40_000 * at[-1]
     between = np.abs(np.interp(places, at, energy)[:, None] - energy)

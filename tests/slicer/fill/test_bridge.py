@@ -1,4 +1,4 @@
-"""Bridges: their direction against brute force, where their lines end, and how they are printed."""
+"""Bridges: their direction against brute force, the ends of their lines, and their printing."""
 
 import manifold3d as m3
 import numpy as np
@@ -57,7 +57,7 @@ def test_in_no_direction_do_lines_sag_much_less(corners: list[tuple[float, float
 
 
 def test_lines_over_a_rectangle_run_along_its_short_side() -> None:
-    """Slanted lines are shorter in the corners alone."""
+    """Slanted lines are shorter in the corners only."""
     hanging = Polygons.square((20.0, 14.0), True)
     assert bridge_over(hanging, offset(hanging, 3.0) - hanging).angle_deg == pytest.approx(90.0, abs=0.1)
 
@@ -79,7 +79,7 @@ def test_a_place_that_one_direction_holds_is_one_bridge(length: float, span: flo
 
 
 def mean_sag(shape: shapely.Geometry, angle: float) -> float:
-    """Mean fourth power of the lengths of lines across a shape, as beams sag, by the length of all lines."""
+    """Mean fourth power of the lengths of lines across a shape, like a beam's sag, weighted by length."""
     turned = rotate(shape, -angle, origin=(0, 0))
     low, high = turned.bounds[1], turned.bounds[3]
     spans = [shapely.LineString([(-99, y), (99, y)]).intersection(turned).length for y in np.arange(low + WIDTH / 2, high, WIDTH)]
@@ -120,7 +120,7 @@ def test_bridges_have_their_own_speed_and_flow_and_end_on_the_banks() -> None:
 
 @pytest.mark.parametrize("angle_deg", [60.0, 180.0])
 def test_bridges_run_in_the_direction_that_is_asked_for(angle_deg: float) -> None:
-    """Along the banks of a gap, at 180 degrees, none is held; portals are bridged along x where nothing is asked for."""
+    """At 180 degrees, along the banks of a gap, no bridge is held; without a set angle, portals are bridged along x."""
     hanging, banks = gap(20, 5, 0)
     span = find_bridge(hanging, index_edges(offset(banks, 0.25 * WIDTH)), WIDTH, angle_deg)
     assert (span is None) == (angle_deg == 180.0)
@@ -131,7 +131,7 @@ def test_bridges_run_in_the_direction_that_is_asked_for(angle_deg: float) -> Non
 
 
 def test_thick_bridges_are_round_threads_of_the_nozzle_s_diameter_as_far_apart() -> None:
-    """A thread of 0.4 mm has pi / 4 * 0.4^2 = 0.1257 mm2. Between three walls 7.5 mm are left, 17 times 0.45 mm."""
+    """A thread of 0.4 mm has pi / 4 * 0.4^2 = 0.1257 mm2. Between three walls on each side 7.5 mm are left, 17 times 0.45 mm."""
     sliced = slice_part(whole(portal(5)), profile(*SOLID, "process.thick_bridges=true"))
     layer = next(layer for layer in sliced.layers if layer.is_of(Kind.BRIDGE).any())
     rows = layer.is_of(Kind.BRIDGE)
@@ -171,7 +171,7 @@ OWN = ("process.infill_bridge_speed_mm_s=33", "material.fan_infill_bridge=0.8", 
 
 
 def bridged_layers(*settings: str) -> dict[int, list[Path]]:
-    """Numbers of the layers of a box that have bridges, and those bridges."""
+    """The layers of a box that have bridges, by number, with those bridges."""
     sliced = slice_part(whole(box(24, 24, 4)), profile("process.least_layer_time_s=0", *settings))
     bridges = {k: [p for p in layer.paths if p.kind is Kind.BRIDGE] for k, layer in enumerate(sliced.layers)}
     return {k: paths for k, paths in bridges.items() if paths}
@@ -182,7 +182,7 @@ def test_the_first_skin_over_sparse_infill_is_a_bridge_with_speed_fan_and_flow_o
     assert layer == 20 - 4
     assert {(path.speed_mm_s, path.fan) for path in paths} == {(33.0, 0.8)}
     assert max(path.flow for path in paths) == pytest.approx(1.1, abs=0.05)
-    assert 1.0 < sum(path.length_mm for path in paths) * 0.407 / (24 - 2 * 1.24) ** 2 < 1.06  # the joints lie beside the lines
+    assert 1.0 < sum(path.length_mm for path in paths) * 0.407 / (24 - 2 * 1.24) ** 2 < 1.06  # joints between lines add length
 
 
 def test_bridges_over_sparse_lines_run_across_them() -> None:

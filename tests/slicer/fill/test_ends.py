@@ -1,4 +1,4 @@
-"""Strokes of skin and of infill end on the plastic below."""
+"""Strokes of skin and infill end on the plastic below."""
 
 from dataclasses import replace
 
@@ -40,9 +40,9 @@ def reach(skin: list[Bead]) -> tuple[float, float]:
     ("begin", "end", "held"),
     [
         (0.0, 3.0, (0.0, 3.0)),  # on both rails
-        (0.1, 2.9, (0.1, 2.9)),  # some of the last width lies on them
-        (0.4, 2.6, (0.0, 3.0)),  # goes on to what is near
-        (-2.0, 3.0, (-0.4, 3.0)),  # ends where there is plastic: no farther beyond than half a line and the rail
+        (0.1, 2.9, (0.1, 2.9)),  # part of the last width lies on them
+        (0.4, 2.6, (0.0, 3.0)),  # continues to the nearby plastic
+        (-2.0, 3.0, (-0.4, 3.0)),  # ends where there is plastic: at most half a line width and the rail farther
         (-2.0, 5.0, (-0.4, 3.4)),
     ],
 )
@@ -79,7 +79,7 @@ def test_a_bridge_may_end_where_the_model_has_nothing_below() -> None:
 
 
 def test_a_stroke_is_not_extended_out_of_the_outline_of_its_own_layer() -> None:
-    own = Polygons.square((6.0, 20.0), True)  # ends at x 3, above the middle of the last rail
+    own = Polygons.square((6.0, 20.0), True)  # it ends at x 3, above the middle of the last rail
     below = plastic_of([rail(0.0), rail(2.0), rail(3.0)])
     skin = hold_ends([bead(Kind.SKIN, (0.0, 0.0), (2.6, 0.0))], below, own, MODEL, WIDTH)
     assert reach(skin) == pytest.approx((0.0, 2.0), abs=WIDTH)

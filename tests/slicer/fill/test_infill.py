@@ -1,4 +1,4 @@
-"""Infill meets its density and stays in its area; its lines lie where the pattern has them."""
+"""Infill has its density and stays in its area; its lines follow the pattern."""
 
 from itertools import pairwise
 

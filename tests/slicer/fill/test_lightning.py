@@ -1,4 +1,4 @@
-"""Lightning infill holds what is solid above it, leans no farther than plastic may, and uses no more than that takes."""
+"""Lightning infill holds the solid layers above it, leans no farther than plastic may, and uses no more than necessary."""
 
 from collections.abc import Sequence
 
@@ -111,7 +111,7 @@ def test_the_floor_of_a_pocket_is_held_as_a_roof_is() -> None:
         if path.kind is Kind.INFILL and np.abs(path.points[:, :2]).max() < 6.0
     ]
     assert held
-    assert max(held) < 60  # the floor lies at 12 mm
+    assert max(held) < 60  # the floor is at 12 mm
 
 
 @pytest.mark.parametrize("branches", [(0.1, 0.5), (0.5, 0.1)])

@@ -1,4 +1,4 @@
-"""Skins in order: every line on the same side of its neighbour, and nothing lost by it."""
+"""Monotonic skins: every line is printed on the same side of its neighbour, and none is lost."""
 
 from math import cos, radians, sin
 
@@ -33,7 +33,7 @@ def plate(holes: list[tuple[float, float, float]]) -> Polygons:
 
 
 def lines_of(beads: list[Bead], angle_deg: float) -> Floats:
-    """(n, 3) height, left and right end of every straight line along the angle, in the order of printing."""
+    """(n, 3) height, left and right end of every straight line along the angle, in printing order."""
     c, s = cos(radians(angle_deg)), sin(radians(angle_deg))
     rows = []
     for bead in beads:
@@ -44,7 +44,7 @@ def lines_of(beads: list[Bead], angle_deg: float) -> Floats:
 
 
 def out_of_order(lines: Floats) -> int:
-    """How many neighbours, less than 1.5 spacings apart and side by side, were printed upper line first."""
+    """Number of neighbouring lines, less than 1.5 spacings apart and overlapping, whose upper line is printed first."""
     height, left, right = lines.T
     up = height[None, :] - height[:, None]
     beside = np.minimum(right[:, None], right[None, :]) - np.maximum(left[:, None], left[None, :]) > 0.05

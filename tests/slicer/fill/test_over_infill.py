@@ -1,4 +1,4 @@
-"""Skins over sparse infill end on infill or on what is solid."""
+"""Skins over sparse infill end on infill or on solid plastic."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -23,7 +23,7 @@ WIDTH = 0.4
 CELL = 6.0
 INFILL = [np.array([[x, -15.0], [x, 15.0]]) for x in (-12.0, -6.0, 0.0, 6.0, 12.0)]
 INSIDE = Polygons.square((30.0, 30.0), True)
-LINE = 0.45  # of a profile
+LINE = 0.45  # line width of a profile
 
 
 def block(x: float, y: float, side: float) -> Polygons:
@@ -41,7 +41,7 @@ def test_a_skin_between_two_lines_of_infill_grows_to_both_and_no_farther() -> No
     assert (left, right) == pytest.approx((0.0, 6.0), abs=0.2)
     assert (low, high) == pytest.approx((-1.0, 1.0), abs=WIDTH)
     assert grown.solid.area() + grown.sparse.area() == pytest.approx(900.0)
-    assert grown.uncut.area() == pytest.approx(grown.sparse.area())  # what skins grow is no plastic that a cut costs
+    assert grown.uncut.area() == pytest.approx(grown.sparse.area())  # the skins' growth is not plastic that a cut costs
 
 
 def test_a_skin_grows_along_its_lines_whichever_way_these_run() -> None:
@@ -57,7 +57,9 @@ def test_a_skin_on_the_skin_of_the_layer_below_does_not_grow() -> None:
 
 
 def test_a_bridge_over_infill_has_no_tongue_too_narrow_for_a_line() -> None:
-    solid = block(0.0, 0.0, 10.0) + Polygons.square((8.0, 0.5 * WIDTH)).translate((5.0, 0.0))  # a strip of half a line beside it
+    solid = block(0.0, 0.0, 10.0) + Polygons.square((8.0, 0.5 * WIDTH)).translate(
+        (5.0, 0.0)
+    )  # and a strip of half a line beside it
     bridge = infill_bridges(region(solid), block(0.0, 0.0, 9.0), WIDTH)
     assert bridge.bounds() == pytest.approx((-5.0, -5.0, 5.0, 5.0), abs=0.1 * WIDTH)
 
@@ -66,9 +68,9 @@ def test_a_bridge_over_infill_ends_under_the_walls_around_a_pit() -> None:
     bare, inside = block(0.0, 0.0, 3.0), block(0.0, 0.0, 10.0)  # the floor of a pit, on solid layers 0.4 mm wider all round
     region = Region(bare, inside, Polygons(), Polygons(), Polygons())
     bridge = infill_bridges(region, inside - block(0.0, 0.0, 3.8), WIDTH)
-    half = 1.5 + 0.5 * WIDTH  # so far in reach the wedges between line ends, which stay open
+    half = 1.5 + 0.5 * WIDTH  # as far as the wedges between line ends reach, which stay open
     assert (bridge ^ block(0.0, 0.0, 2.0 * half)).is_empty()
-    held = block(0.0, 0.0, 3.8) - block(0.0, 0.0, 3.0 + 1.5 * WIDTH)  # still it lies on the solid layers, by a quarter of a line
+    held = block(0.0, 0.0, 3.8) - block(0.0, 0.0, 3.0 + 1.5 * WIDTH)  # it still lies on the solid layers, by a quarter of a line
     assert (held - bridge).area() == pytest.approx(0.0, abs=0.01)
 
 
@@ -79,7 +81,7 @@ def test_without_infill_a_skin_grows_to_the_walls() -> None:
 
 def test_skins_that_face_each_other_over_a_void_without_infill_become_one() -> None:
     void = block(0.0, 0.0, 10.0)
-    skins = block(-5.0, 0.0, 4.0) + block(5.0, 0.0, 4.0)  # each begins on what is solid and ends 3 mm from the other's middle
+    skins = block(-5.0, 0.0, 4.0) + block(5.0, 0.0, 4.0)  # each begins on plastic and ends 3 mm from the other's middle
     one = anchored(Region(Polygons(), Polygons(), skins, void - skins, void - skins), void, [], 0.0, WIDTH, 0.0).solid
     assert (Polygons.square((10.0, 3.9), True) - one).is_empty()
 
@@ -104,7 +106,7 @@ def pit() -> m3.Manifold:
 
 
 def skin_below_the_pit(*settings: str) -> Floats:
-    """(2,) how far the skin of the layers just below the pit reaches from its middle, along the lines and across."""
+    """(2,) how far the skin of the layers just below the pit reaches from its centre, along the lines and across."""
     keys = [f"process.{key}" for key in ("infill_pattern=rectilinear", "top_layers=3", "top_thickness_mm=0", "solid_below_mm2=0")]
     layers = slice_part(whole(standing(pit())), profile(*BARE, *keys, *settings)).layers
     paths = [path for layer in layers if 1.5 < layer.z_mm < 3.25 for path in layer.paths if path.kind in SKINS]
@@ -113,7 +115,7 @@ def skin_below_the_pit(*settings: str) -> Floats:
 
 
 def test_the_skin_below_a_pit_grows_to_the_next_lines_and_not_to_the_walls() -> None:
-    half_mm, cell_mm = 3.0 / 2.0**0.5, 0.41 / 0.15  # half of the pit's diagonal, and the distance of lines
+    half_mm, cell_mm = 3.0 / 2.0**0.5, 0.41 / 0.15  # half of the pit's diagonal, and the distance between lines
     assert (skin_below_the_pit("process.infill_density=0.15") < half_mm + cell_mm + 2.0).all()
 
 
@@ -129,7 +131,7 @@ def test_the_bridge_over_a_hollow_goes_on_to_the_walls_around_it() -> None:
     hollow = m3.Manifold.cube((26, 20, 10)) - m3.Manifold.cube((20, 14, 6)).translate((3, 3, 2))
     ceiling = slice_part(whole(standing(hollow)), profile(*BARE)).layers[40]
     lines = np.concatenate([path.points for path in ceiling.paths if path.kind == Kind.BRIDGE])
-    assert np.abs(lines[:, 0]).max() > 13.0 - 4.0 * WIDTH  # three walls, and half a line
+    assert np.abs(lines[:, 0]).max() > 13.0 - 4.0 * WIDTH  # three walls and half a line
     assert np.abs(lines[:, 1]).max() > 10.0 - 4.0 * WIDTH
 
 
@@ -145,7 +147,7 @@ def pocketed(random: np.random.Generator) -> m3.Manifold:
 
 
 def farthest_end_mm(below: Sequence[Stroke], above: Sequence[Stroke]) -> float:
-    """How far the last line width of a stroke of skin lies from the plastic of the layer below, at most."""
+    """The greatest distance of the last line width of a skin stroke from the plastic of the layer below."""
     plastic = shapely.union_all([shapely.LineString(path.points[:, :2]).buffer(0.5 * path.width_mm) for path in below])
     strokes = [shapely.LineString(path.points[:, :2]) for path in above if path.kind in SKINS]
     tails = [substring(line, *part) for line in strokes for part in ((0.0, LINE), (line.length - LINE, line.length))]

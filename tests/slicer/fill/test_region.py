@@ -1,4 +1,4 @@
-"""Skin lies where a layer is bare above or below, and nowhere else."""
+"""Skin covers the regions of a layer that are bare above or below, and no others."""
 
 from collections.abc import Sequence
 
@@ -26,7 +26,7 @@ def process(top: int = 2, bottom: int = 2, density: float = 0.2, **others: float
 
 
 def alone(sections: Sequence[Polygons], insides: Sequence[Polygons], beneath: Polygons | None, keys: Process) -> list[Region]:
-    """Regions of a model in one part, or of one on plastic that goes on downward."""
+    """Regions of a model in one part, or on plastic that continues downward."""
     top, bottom = shell_layers(keys)
     cover = Cover(sections, insides, [beneath or Polygons()] * bottom, [Polygons()] * top)
     return regions(insides, cover, beneath is not None, keys)
@@ -175,7 +175,7 @@ def test_sparse_is_what_each_of_so_many_layers_below_covers(count: int) -> None:
             expected = expected ^ layer
         expected = expected if i >= count else Polygons()
         assert (region.sparse - expected).area() < 1e-6
-        assert (offset(expected, -2.0 * WIDTH) - region.sparse).area() < 1e-6  # beside walls that begin it is solid
+        assert (offset(expected, -2.0 * WIDTH) - region.sparse).area() < 1e-6  # solid beside walls that begin in it
 
 
 def test_opening_drops_what_is_too_narrow_only() -> None:

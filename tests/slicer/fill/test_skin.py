@@ -1,4 +1,4 @@
-"""Skins are solid, and their joints stay in their area."""
+"""Skins are solid, and the joints of their lines stay in their area."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -40,7 +40,7 @@ def test_a_skin_covers_its_area_everywhere() -> None:
 
 
 def open_mm2(area: Polygons, solid: SolidLines) -> float:
-    """What neither the lines of a skin nor the walls around it, which reach half a gap over its border, lie on."""
+    """Area covered neither by the lines of a skin nor by the walls around it, which overlap its border by half a gap."""
     lines = [shapely.LineString(b.points).buffer(b.width_mm / 2) for b in skin_beads(area, Kind.TOP_SKIN, solid)]
     return float(as_shapely(area).buffer(0.5 * (solid.spacing_mm - WIDTH)).difference(shapely.union_all(lines)).area)
 
@@ -51,7 +51,7 @@ def test_skins_that_are_seen_leave_less_than_half_as_much_open_beside_the_walls(
     slot = Polygons.square((40.0, 4.0))
     seen, hidden = (open_mm2(slot, SolidLines(angle, WIDTH, HEIGHT, OVERLAP, pattern, seen)) for seen in (True, False))
     assert 0.0 < seen < 0.5 * hidden
-    assert skin_beads(slot, Kind.TOP_SKIN, SolidLines(90.0, WIDTH, HEIGHT, OVERLAP, pattern, True))  # nothing open to reach into
+    assert skin_beads(slot, Kind.TOP_SKIN, SolidLines(90.0, WIDTH, HEIGHT, OVERLAP, pattern, True))  # no open area to reach into
 
 
 @pytest.mark.parametrize("pattern", ["monotonic", "rectilinear"])
@@ -59,7 +59,7 @@ def test_wherever_the_last_line_of_a_seen_skin_meets_a_corner_less_than_a_quarte
     pattern: SkinPattern,
 ) -> None:
     solid = SolidLines(45.0, WIDTH, HEIGHT, OVERLAP, pattern, True)
-    for length in np.arange(3.0, 3.6, 0.1):  # of an arm, one row of lines after the other
+    for length in np.arange(3.0, 3.6, 0.1):  # of an arm, one row of lines after another
         arm = Polygons.square((1.2, float(length))).translate((4.0, 10.0))
         assert open_mm2(Polygons.square((10.0, 10.0)) + arm, solid) < 0.25 * WIDTH**2
 

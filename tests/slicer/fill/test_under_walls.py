@@ -1,4 +1,4 @@
-"""Walls that lean in over sparse infill lie on a line of infill along the walls below."""
+"""Walls that lean inward over sparse infill are printed on a line of infill along the walls below."""
 
 import manifold3d as m3
 import pytest
@@ -13,7 +13,7 @@ LINE, HEIGHT = 0.45, 0.2
 
 
 def cone(inward: float, *keys: str) -> tuple[Layer, ...]:
-    """The layers of a cone whose radius shrinks by `inward` line widths from layer to layer."""
+    """The layers of a cone whose radius shrinks by `inward` line widths per layer."""
     height = 4.0
     shape = m3.Manifold.cylinder(height, 14.0, 14.0 - inward * LINE * height / HEIGHT, 96)
     return slice_part(whole(standing(shape)), profile(*BARE, "process.infill_density=0.1", *keys)).layers

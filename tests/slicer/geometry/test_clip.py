@@ -14,13 +14,13 @@ from slicer.geometry.edge_index import index_edges
 from slicer.geometry.polygons import Polygons, contours
 from tests.slicer.hand import as_shapely, ragged
 
-FAR = 60.0  # lines begin and end outside of all shapes
+FAR = 60.0  # lines begin and end outside all shapes
 seeds = st.integers(0, 10**6)
 few = settings(deadline=None, max_examples=30)
 
 
 def wandering(seed: int, count: int = 6) -> list[Floats]:
-    """Polylines from the left of everything to its right, back and forth in between."""
+    """Polylines from left of all shapes to their right, back and forth in between."""
     random = np.random.default_rng(seed)
     inner = random.uniform(-30.0, 30.0, (count, 5, 2))
     ends = random.uniform(-30.0, 30.0, (count, 2))

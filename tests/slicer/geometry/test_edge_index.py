@@ -1,4 +1,4 @@
-"""Edge index: crossings, points inside, nearest points and depths, judged by shapely."""
+"""Edge index: crossings, points inside, nearest points and depths, checked by shapely."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Polygons: their booleans and offsets judged by shapely, their pieces, their contours."""
+"""Polygons: booleans and offsets checked by shapely, connected pieces, contours."""
 
 from dataclasses import fields, is_dataclass
 from importlib import import_module
@@ -80,7 +80,7 @@ def test_a_hole_that_touches_the_outline_at_its_farthest_point_is_not_taken_for_
 
 
 def grown_mm2(polygons: Polygons, distance_mm: float) -> float:
-    """The same by shapely."""
+    """Area of offset polygons, by shapely."""
     loops = [shapely.Polygon(loop) for loop in contours(polygons)]
     whole = loops[0].difference(shapely.union_all(loops[1:]))
     return float(whole.buffer(distance_mm).area)
@@ -199,7 +199,7 @@ def test_a_strip_reaches_as_far_as_each_of_its_segments_tells() -> None:
 
 
 def test_a_speck_whose_area_is_rounding_leaves_nothing_when_it_is_moved_inward() -> None:
-    x = np.array([-8.572013482451439, -8.5720134973526, -8.652947783470154, -8.814816400408745])  # what a boolean once left
+    x = np.array([-8.572013482451439, -8.5720134973526, -8.652947783470154, -8.814816400408745])  # the result of a boolean
     y = np.array([-16.172413803637028, -16.172413803637028, -16.179024517536163, -16.192245960235596])
     assert offset(Polygons([np.column_stack([x, y])]), -0.136).is_empty()
 

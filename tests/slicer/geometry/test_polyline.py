@@ -1,4 +1,4 @@
-"""Simplified polylines keep few points and leave none of the others far off."""
+"""Simplified polylines keep few points and stay near all others."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def lengthened(points: Floats, shortest_mm: float, most_mm: float) -> Floats:
 def test_a_short_step_round_a_corner_is_lengthened_along_the_longer_step_beside_it() -> None:
     bevelled = np.array([[0.0, 0.0], [5.0, 0.0], [5.1, 0.1], [5.1, 5.0]])
     points = lengthened(bevelled, 0.25, 0.1)
-    back_mm = np.sqrt(0.25**2 - 0.1**2) - 0.1  # its corner goes back until the step is the hypotenuse of 0.1 and 0.1 + back
+    back_mm = np.sqrt(0.25**2 - 0.1**2) - 0.1  # its corner moves back until the step is the hypotenuse of 0.1 and 0.1 + back
     assert points.tolist() in [
         [[0.0, 0.0], [pytest.approx(5.0 - back_mm), 0.0], [5.1, 0.1], [5.1, 5.0]],
         [[0.0, 0.0], [5.0, 0.0], [5.1, pytest.approx(0.1 + back_mm)], [5.1, 5.0]],
@@ -61,4 +61,4 @@ def test_lengthened_steps_leave_the_line_where_it_was_and_make_none_shorter(corn
     before, after = (np.hypot(*np.diff(way, axis=0).T) for way in (points, line))
     assert [line[0].tolist(), line[-1].tolist()] == [list(corners[0]), list(corners[-1])]
     assert (after < 0.2 - 1e-9).sum() <= (before < 0.2 - 1e-9).sum()
-    assert shapely.LineString(points).hausdorff_distance(shapely.LineString(line)) < 0.2 + 1e-9  # a point and the next one move
+    assert shapely.LineString(points).hausdorff_distance(shapely.LineString(line)) < 0.2 + 1e-9  # a point and its successor move

@@ -1,4 +1,4 @@
-"""Predicates of plane geometry, judged by shapely and by exact fractions."""
+"""Predicates of plane geometry, checked by shapely and by exact fractions."""
 
 from fractions import Fraction
 from typing import Any
@@ -15,7 +15,7 @@ from slicer.geometry.polyline import Segment
 
 whole = st.integers(-6, 6).map(float)
 places = st.tuples(whole, whole)
-tenths = st.integers(-300, 300).map(lambda n: 0.1 * n)  # shapely gives no distance to a segment of 1e-255
+tenths = st.integers(-300, 300).map(lambda n: 0.1 * n)  # shapely returns no distance to a segment of 1e-255
 spots = st.tuples(tenths, tenths)
 
 

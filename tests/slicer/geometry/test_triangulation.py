@@ -1,4 +1,4 @@
-"""Triangulations of polygons, judged by shapely's constrained Delaunay triangulation."""
+"""Triangulations of polygons, checked by shapely's constrained Delaunay triangulation."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ def corners(polygons: Polygons) -> Floats:
 
 
 def as_rows(triangles: Floats) -> set[tuple[float, ...]]:
-    """Triangles as sets of rounded corners, wherever each begins and whichever way it turns."""
+    """Triangles as sets of rounded corners, independent of the first corner and the orientation."""
     rounded = np.round(triangles, 6).tolist()
     return {tuple(value for corner in sorted(map(tuple, triangle)) for value in corner) for triangle in rounded}
 
@@ -35,7 +35,7 @@ def test_the_triangles_are_those_of_shapely_s_constrained_delaunay_triangulation
 
 
 def points_in_circles(mesh: Triangulation) -> int:
-    """How many inner sides have the point beyond them clearly inside the circle through their triangle."""
+    """Number of inner edges whose opposite corner lies clearly inside the circumcircle of their triangle."""
     corners = mesh.points[mesh.tails].reshape(-1, 3, 2)
     inner = np.flatnonzero(mesh.across >= 0)
     beyond = mesh.points[mesh.tails[mesh.across[inner] - mesh.across[inner] % 3 + (mesh.across[inner] + 2) % 3]]
@@ -62,7 +62,7 @@ def test_sides_with_samples_have_the_triangles_of_polygons_that_have_these_point
     assert points_in_circles(mesh) == 0
     outer = sum(area_mm2(loop) > 0 for loop in contours(star))
     holes = len(contours(star)) - outer
-    assert len(mesh.tails) // 3 == len(mesh.points) - 2 * outer + 2 * holes  # Euler
+    assert len(mesh.tails) // 3 == len(mesh.points) - 2 * outer + 2 * holes  # Euler's formula
     sides = np.flatnonzero(mesh.across < 0)
     ends = mesh.points[mesh.tails[sides - sides % 3 + (sides + 1) % 3]]
     lengths = np.hypot(*(ends - mesh.points[mesh.tails[sides]]).T)

@@ -1,4 +1,4 @@
-"""The base plane of a later part as an earlier part sees it, judged in the workpiece frame, point by point."""
+"""The base plane of a later part as an earlier part sees it, checked in the workpiece frame point by point."""
 
 import numpy as np
 import pytest
@@ -25,7 +25,7 @@ directions = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(0.1
 
 
 def part(index: int, direction: Vector, through: Vector) -> Part:
-    """One whose base plane leans as its direction says and goes through a point of the workpiece frame."""
+    """A part with a base plane normal to its direction through a point of the workpiece frame."""
     normal = unit(direction)
     across = unit(np.cross((0.3, 1.0, 0.2), normal))
     rotation = np.array([across, np.cross(normal, across), normal])
@@ -44,7 +44,7 @@ def plane_of(earlier: Part, later: Part) -> BasePlane:
 
 
 def lattice(z_mm: float) -> Floats:
-    """(n, 3) points of a height, none of them where a border is likely."""
+    """(n, 3) points at a height, chosen to avoid borders."""
     x, y = np.meshgrid(np.arange(-20.13, 20.0, 3.7), np.arange(-20.29, 20.0, 3.7))
     return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, z_mm)])
 

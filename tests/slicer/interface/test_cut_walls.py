@@ -1,4 +1,4 @@
-"""The shell of a cut model: whole outside, thin on the faces of cuts, and a floor under every later part."""
+"""The shell of a cut model: complete outside, thin on cut faces, and a floor under every later part."""
 
 from functools import cache
 
@@ -21,7 +21,7 @@ from tests.slicer.hand import BARE, cut, of_kind, profile
 SIDE, HEIGHT = 24.0, 30.0
 STRAIGHT, TILTED, STEEP = (0.0, 0.0, 1.0), (0.0, 0.5, 0.8), (0.9, 0.1, 0.3)
 PLAIN = (*BARE, "process.interface_walls=1", "process.interface_top_layers=2")
-# Three walls of 0.45 mm stand 1.24 mm deep, four layers lie 0.8 mm deep: on a slope where both are as near, they leave less.
+# Three walls of 0.45 mm are 1.24 mm deep, four layers 0.8 mm; on a slope where both are equally near, the shell is thinner.
 SHELL_MM = 0.6
 
 
@@ -76,7 +76,7 @@ def test_no_infill_is_sparse_within_the_shell_s_thickness_of_the_surface(shape: 
     for part, layers in zip(parts(shape, normal), shells(shape, normal), strict=True):
         for shell, z_mm in zip(layers.layers, layers.sections.heights.cut_mm, strict=True):
             seen += shell.region.sparse.area()
-            for loop in contours(shell.region.sparse):  # in a convex model the least depth of a polygon is a corner's
+            for loop in contours(shell.region.sparse):  # in a convex model the least depth of a polygon is at a corner
                 assert depth_mm(shape, in_model(part, loop, z_mm)).min() > SHELL_MM
     assert seen > 10000
 
@@ -91,7 +91,7 @@ def test_all_of_a_layer_is_covered_by_beads_but_for_the_infill(shape: str, norma
                 covered = covered + strips([path.points], 0.5 * path.width_mm)
             section = layers.sections.own[at]
             bare = section - covered - layers.layers[at].region.sparse
-            # a stroke of skin beside a line of infill that would lie on nothing is left out
+            # a skin stroke that would lie on nothing is left out, beside a line of infill
             assert offset(bare, -0.12).area() < 0.0025 * section.area()
 
 
@@ -132,7 +132,7 @@ def test_with_as_many_walls_on_a_cut_as_outside_all_run_round() -> None:
 
 
 def test_the_plastic_of_a_straight_cut_is_a_floor_and_a_rim() -> None:
-    """A floor of two layers where the walls leave room, and on it a solid layer of 0.1 mm with a tenth more than its room."""
+    """A floor of two layers inside the walls, and on it a solid layer of 0.1 mm with a tenth more plastic than its volume."""
     under, over = (interface_mm3(both) for both in shells("cube", STRAIGHT))
     inside = (SIDE - 2 * 1.243) ** 2
     floor = 0.8 * 0.4 * inside

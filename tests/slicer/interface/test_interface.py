@@ -1,4 +1,4 @@
-"""Frames, sections and edges between the parts of a model: they share it out, and points stay where they are."""
+"""Frames, sections and edges between the parts of a model: the parts fill it without overlap, and points keep their position."""
 
 from collections.abc import Sequence
 
@@ -134,7 +134,7 @@ def test_a_limb_s_plane_shares_in_places_beside_the_limb_alone() -> None:
     ("beside", "area_mm2"),
     [
         (Polygons.square((5.0, 10.0)).translate((10.0, 0.0)), 150.0),
-        (Polygons.square((5.0, 10.0)).translate((10.01, 0.0)), 150.1),  # a slit that is closed
+        (Polygons.square((5.0, 10.0)).translate((10.01, 0.0)), 150.1),  # a closed slit
         (Polygons.square((5.0, 10.0)).translate((11.0, 0.0)), None),
         (NOTHING, None),
         (Polygons.square((5.0, 10.0)).translate((10.0, 0.0)) + Polygons.square((5.0, 5.0)).translate((40.0, 0.0)), 150.0),
@@ -194,7 +194,7 @@ def test_the_skin_beside_an_edge_is_the_outer_wall_as_near_to_it_in_space(seed: 
 
 
 def test_where_faces_are_upright_in_both_parts_the_outer_walls_at_a_joint_are_one() -> None:
-    lower, upper = cut(box(20, 20, 40), ((0.5, 0.0, 0.8), 15.0))  # the faces at y = -10 and 10 stand along both directions
+    lower, upper = cut(box(20, 20, 40), ((0.5, 0.0, 0.8), 15.0))  # the faces at y = -10 and 10 are parallel to both directions
     above, below = slice_part(upper, profile(), (lower,)), slice_part(lower, profile(), (), (upper,))
     for part, layers in ((upper, above.layers[:1]), (lower, below.layers[-40:-20])):
         assert _edges_along_y(part, layers) == pytest.approx((-10.0, 10.0), abs=0.05)

@@ -1,4 +1,4 @@
-"""Grooves between parts: where they lie, that they are filled, and that the tip stays above them."""
+"""Grooves between parts: their positions, that they are filled, and that the tip stays above them."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Pins: as much plastic as their holes hold, one hole clear of the shell and of all others, and the tip at its mouth."""
+"""Pins: plastic that fills their holes exactly, holes clear of the shell and of each other, and the tip at the mouth."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -49,7 +49,7 @@ def sections_of(parts: Sequence[Part], own: Profile) -> list[Sections]:
 
 
 def removed_mm3(parts: Sequence[Part], *keys: str) -> float:
-    """What pins take of the outlines of all layers."""
+    """Volume that pins remove from the sections of all layers."""
     with_pins, without = (sections_of(parts, profile(*BARE, *more, *keys)) for more in (PINS, ()))
     return sum(
         float(np.dot([a.area() - b.area() for a, b in zip(bare.own, holed.own, strict=True)], bare.heights.height_mm))
@@ -58,7 +58,7 @@ def removed_mm3(parts: Sequence[Part], *keys: str) -> float:
 
 
 def poured_mm3(parts: Sequence[Part], *keys: str) -> float:
-    """What the beads that fill pins take."""
+    """Volume of the beads that fill pins."""
     own = profile(*BARE, *PINS, *keys)
     area = bead_area_mm2(own.process.line_width_mm, 0.2) * own.process.interface_flow
     beads = [bead for pins in plan_pins(parts, own).values() for bead in fill_pins(pins, own, 0.2)]
@@ -66,7 +66,7 @@ def poured_mm3(parts: Sequence[Part], *keys: str) -> float:
 
 
 def axis(part: Part, pin: Floats) -> Floats:
-    """(2, 3) the ends of a pin's middle line in the workpiece frame."""
+    """(2, 3) the ends of a pin's axis in the workpiece frame."""
     ends = np.array([[*pin[:2], part.base.offset_mm], [*pin[:2], part.base.offset_mm - DEEP]])
     return np.asarray(ends @ part.rotation)
 
@@ -101,7 +101,7 @@ def test_a_leaning_part_fills_its_holes_within_two_percent(tilt_deg: float, x: f
     st.floats(0.4, 2.5),
 )
 def test_no_pin_comes_near_the_outside_of_any_star(star: list[tuple[float, float]], twist: float, widening: float) -> None:
-    """Of a twisted, widening or narrowing prism over any star: a tube as wide as a hole and the walls round it lies inside."""
+    """In a twisted, widening or narrowing prism over any star, a tube as wide as a hole with the walls around it lies inside."""
     turns = np.cumsum([step for _, step in star]) / sum(step for _, step in star) * 2.0 * np.pi
     outline = np.array([r for r, _ in star])[:, None] * np.column_stack([np.cos(turns), np.sin(turns)])
     assume(shapely.Polygon(outline).is_valid)
@@ -117,7 +117,7 @@ def test_no_pin_comes_near_the_outside_of_any_star(star: list[tuple[float, float
 
 
 def test_in_a_stem_that_narrows_below_the_cut_its_narrowest_place_counts() -> None:
-    """As deep as a hole and the walls below it, 4.8 mm under the cut of 9 mm radius, the stem has 6.6 mm."""
+    """At the depth of a hole and the walls below it, 4.8 mm under the cut of 9 mm radius, the stem's radius is 6.6 mm."""
     cone = m3.Manifold.cylinder(24.0, 3.0, 15.0, 360)
     pins = plan_pins(cut(from_manifold(cone), (UP, 12.0)), profile(*PINS, "process.pin_spacing_mm=1.9"))[2]
     farthest = np.hypot(*pins[:, :2].T).max()
@@ -125,7 +125,7 @@ def test_in_a_stem_that_narrows_below_the_cut_its_narrowest_place_counts() -> No
 
 
 def test_pins_of_two_parts_in_one_keep_clear_of_each_other() -> None:
-    """Two arms lean apart from one ridge, so that what holds them would meet below it."""
+    """Two arms lean apart from one ridge, so that their pins would meet below it."""
     half = m3.Manifold.cube((50.0, 30.0, 60.0), True)
     left, right = (1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)
     parts = cut(from_manifold(half.translate((0.0, 0.0, 30.0))), (left, 26.0), (right, 26.0))
@@ -147,7 +147,7 @@ def test_below_and_round_a_hole_there_is_plastic_and_walls_run_round_it() -> Non
     lower = slice_part(base, profile(*BARE, *PINS), later=[top])
     walls = [path for layer in lower.layers for path in layer.paths if path.kind is Kind.OUTER_WALL and path.length_mm < 6.0]
     per_hole = [path for path in walls if np.hypot(*(path.points.mean(axis=0) - (4.0, 4.0))) < 0.2]
-    assert len(per_hole) == 15  # 3 mm of 0.2 mm
+    assert len(per_hole) == 15  # 3 mm in layers of 0.2 mm
     assert [path.length_mm for path in per_hole] == pytest.approx([np.pi * (WIDE + WIDTH)] * 15, rel=0.03)
     floor = shapely.union_all([shapely.LineString(path.points).buffer(0.5 * path.width_mm) for path in lower.layers[34].paths])
     assert shapely.Point(4.0, 4.0).buffer(0.5 * WIDE).difference(floor.buffer(0.05)).area < 0.01

@@ -1,4 +1,4 @@
-"""Islands: the piece that a bead begins in, by shapely, and travels that retract because they leave it."""
+"""Islands: the piece of a section in which a bead begins, by shapely, and travels that retract because they leave it."""
 
 import numpy as np
 import pytest

@@ -34,7 +34,7 @@ def test_lines_are_visited_from_the_nearest_end() -> None:
 
 def test_an_island_is_finished_before_the_next_begins() -> None:
     section = Polygons.square((10, 10), True) + Polygons.square((10, 10), True).translate((20, 0))
-    rank_of = {0.4: -1, 0.45: 0, 0.5: 2}  # by the width, so that a row tells its rank
+    rank_of = {0.4: -1, 0.45: 0, 0.5: 2}  # by the width, so that a row shows its rank
     lines = [(line(x, y, x + 1, y, rank), width) for width, rank in rank_of.items() for x in (-3, 17) for y in (0, 2)]
     beads = [replace(bead, width_mm=width) for bead, width in lines]
     placed = order_beads(beads, section, STANDARD, np.array([0.0, 0.0]))
@@ -50,7 +50,7 @@ def test_an_island_in_a_hole_is_an_island_of_its_own() -> None:
 
 
 def test_small_walls_of_an_island_are_printed_together_and_its_long_ones_too() -> None:
-    """Squares of 2 and of 20 mm in turn in a row: only the small ones, 8 mm round, are printed at small_wall_speed_mm_s."""
+    """A row of alternating squares of 2 and 20 mm: only the small ones, 8 mm round, are printed at small_wall_speed_mm_s."""
     square = np.array([[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]], dtype=float)
     beads = [Bead(Kind.OUTER_WALL, (2.0 if k % 2 else 20.0) * square + (1.0 * k, 0.0), 0.45, 0) for k in range(8)]
     placed = order_beads(beads, Polygons.square((99, 99), True), STANDARD, np.zeros(2))
@@ -78,7 +78,7 @@ def test_inner_walls_that_are_lines_are_printed_among_the_skin_after_all_other_w
 @settings(max_examples=40)
 @given(st.integers(0, 10**6), st.integers(1, 60))
 def test_the_nearest_point_is_the_nearest_of_all(seed: int, count: int) -> None:
-    """Inner walls of ranks of their own come one after the other before the outer wall that is nearest to where they begin."""
+    """Inner walls of different ranks are printed in sequence, each before the outer wall nearest to its start."""
     random = np.random.default_rng(seed)
     points, places = random.uniform(0, 40, (count, 2)) ** (1, 0.5), random.uniform(-20, 60, (50, 2))
     outer = [line(x, y, x, y, 0, Kind.OUTER_WALL) for x, y in points]
@@ -123,7 +123,7 @@ def test_inner_walls_come_from_the_inside_out_then_the_outer_wall_then_the_fill(
 
 def test_seams_of_a_tower_stand_over_each_other() -> None:
     sliced = slice_part(whole(tee()), profile("process.support=none"))
-    below_its_shade = sliced.layers[1:120]  # above the first one, which is smaller; of the arms, in which seams are hidden better
+    below_its_shade = sliced.layers[1:120]  # above the first layer, which is smaller, and below the arms, which hide seams better
     seams = [p.points[0] for layer in below_its_shade for p in layer.paths if p.kind is Kind.OUTER_WALL]
     assert np.ptp(seams, axis=0) == pytest.approx([0, 0], abs=1e-6)
 
@@ -175,7 +175,7 @@ def test_a_travel_round_a_hole_of_its_support_does_not_retract() -> None:
 
 
 def ring(x: float, y: float, kind: Kind = Kind.SUPPORT) -> Bead:
-    """A square of 2 mm round a place, begun at its lower left corner."""
+    """A square of 2 mm around a point, beginning at its lower left corner."""
     corners = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]], dtype=float)
     return Bead(kind, corners + np.array([x, y]), 0.45, OUTSIDE if kind is Kind.SUPPORT else 0)
 
@@ -201,6 +201,6 @@ def test_a_layer_ends_near_the_support_with_which_the_next_one_begins() -> None:
 
 
 def test_every_phase_of_an_island_ends_near_the_next_one() -> None:
-    beads = [line(0, 1, 9, 1, 1), line(0, 2, 9, 2, 1), line(12, 1, 20, 1, 2)]  # that of rank 2 lies right of the others
+    beads = [line(0, 1, 9, 1, 1), line(0, 2, 9, 2, 1), line(12, 1, 20, 1, 2)]  # the line of rank 2 is right of the others
     placed = order_beads(beads, Polygons.square((30, 10)), STANDARD, np.array([4.5, 0.0]))
     assert placed.last_points[:2, 0].tolist() == [0, 9]

@@ -1,4 +1,4 @@
-"""Overhanging walls: which stretches, by how much of the bead lies on the layer below, and what becomes of the rest."""
+"""Overhanging walls: the stretches with too little of the bead on the layer below, and the rest of the wall."""
 
 from itertools import groupby
 from typing import Any
@@ -46,7 +46,7 @@ def test_the_stretch_beyond_the_bank_overhangs_and_nothing_is_lost() -> None:
     )
     assert [kind for kind, _ in groupby(kinds(pieces))] == [Kind.OUTER_WALL, Kind.OVERHANG, Kind.OUTER_WALL]
     assert pieces.lengths_mm[pieces.is_of(Kind.OVERHANG)].sum() == pytest.approx(5 + 10 + 5, abs=0.3)
-    assert pieces.overhang[pieces.lengths_mm.argmax()] == 4  # most of it has nothing under it
+    assert pieces.overhang[pieces.lengths_mm.argmax()] == 4  # most of it has no plastic below
     assert pieces.lengths_mm.sum() == pytest.approx(40)
     assert (pieces.last_points[:-1] == pieces.first_points[1:]).all()
     assert pieces.retract.tolist() == [True] + [False] * (len(pieces) - 1)

@@ -1,4 +1,4 @@
-"""Short orders against brute force."""
+"""Path orders against brute force."""
 
 from collections.abc import Iterable
 from itertools import permutations, product
@@ -12,7 +12,7 @@ from mdp.mesh import Floats
 from slicer.strokes.path_order import order_paths
 
 NO_GOAL, ORIGIN = np.zeros((0, 3)), np.zeros(3)
-CHANGE_MM = 3.0  # of travel that a change of speed is worth
+CHANGE_MM = 3.0  # travel that a change of speed is worth
 
 
 def paths(seed: int, count: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
@@ -25,13 +25,13 @@ def paths(seed: int, count: int) -> tuple[Floats, Floats, NDArray[np.bool_]]:
 
 
 def way(a: Floats, b: Floats) -> Floats:
-    """Travel between places, and what a change of speed is worth."""
+    """Travel between points, plus the travel that a change of speed is worth."""
     apart: Floats = np.hypot(b[..., 0] - a[..., 0], b[..., 1] - a[..., 1]) + CHANGE_MM * (a[..., 2] != b[..., 2])
     return apart
 
 
 def nearest_first(starts: Floats, ends: Floats, fixed: NDArray[np.bool_]) -> tuple[list[int], list[bool]]:
-    """The order and reversals that go from the origin to the nearest path each time."""
+    """The order and reversals of a nearest-neighbour tour from the origin."""
     order, flips, at, far = list[int](), list[bool](), ORIGIN, np.zeros(len(starts))
     while len(order) < len(starts):
         to_start = way(at, starts) + far
@@ -44,7 +44,7 @@ def nearest_first(starts: Floats, ends: Floats, fixed: NDArray[np.bool_]) -> tup
 
 
 def travel(starts: Floats, ends: Floats, order: Iterable[int], flips: Iterable[bool], goal: Floats = NO_GOAL) -> float:
-    """Length of all travels of an order from the origin, and what its changes of speed are worth."""
+    """Length of all travels of an order from the origin, plus the travel that its changes of speed are worth."""
     runs = [(ends[k], starts[k]) if flip else (starts[k], ends[k]) for k, flip in zip(order, flips, strict=True)]
     stops = [ORIGIN, *(point for run in runs for point in run), *goal]
     return sum(float(way(a, b)) for a, b in zip(stops[::2], stops[1::2], strict=False))
@@ -82,7 +82,7 @@ def test_exchanges_save_a_tenth_of_the_travel_between_many_short_lines() -> None
 
 
 def in_turn(step_mm: float) -> tuple[list[int], list[bool]]:
-    """The order of eight short paths in a row, every other one at another speed, as numbers in the row."""
+    """The order of eight short paths in a row with alternating speeds, as indices in the row."""
     row, speeds = step_mm * np.arange(8.0), np.tile([25.0, 60.0], 4)
     starts, ends = np.c_[row, np.zeros(8), speeds], np.c_[row, np.ones(8), speeds]
     order, _ = order_paths(starts, ends, np.zeros(8, dtype=bool), np.array([0.0, 0.0, 25.0]), NO_GOAL)
@@ -90,10 +90,10 @@ def in_turn(step_mm: float) -> tuple[list[int], list[bool]]:
 
 
 def test_close_paths_of_one_speed_are_printed_together() -> None:
-    _, slow = in_turn(1.0)  # to go back along the row once is 7 mm, its seven changes of speed are worth 21
+    _, slow = in_turn(1.0)  # going back along the row once takes 7 mm, its seven changes of speed are worth 21
     assert slow == [True] * 4 + [False] * 4
 
 
 def test_distant_paths_of_one_speed_are_not_grouped() -> None:
-    order, _ = in_turn(50.0)  # to go back is 350 mm
+    order, _ = in_turn(50.0)  # going back takes 350 mm
     assert order == list(range(8))

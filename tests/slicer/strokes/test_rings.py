@@ -1,4 +1,4 @@
-"""Where lines without a seam begin."""
+"""Starting points of lines without a seam."""
 
 import numpy as np
 from hypothesis import given, settings

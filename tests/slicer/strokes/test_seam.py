@@ -1,4 +1,4 @@
-"""Seams: where each rule puts them, that they stay in line, and that none lies on the edge of an interface."""
+"""Seams: their position by each rule, their alignment, and that none lies on the edge of an interface."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -46,13 +46,13 @@ def seam_of(loop: Floats, rule: str, **surroundings: Any) -> tuple[float, float]
 
 
 def outer_seams(sliced: SlicedPart, first: int = 2) -> Floats:
-    """Where the longest outer wall of each layer begins."""
+    """Start of the longest outer wall of each layer."""
     walls = [[p.points for p in layer.paths if p.kind in (Kind.OUTER_WALL, Kind.OVERHANG)] for layer in sliced.layers[first:]]
     return np.array([max(joined(of_layer), key=length_mm)[0] for of_layer in walls if of_layer])
 
 
 def joined(pieces: list[Floats]) -> list[Floats]:
-    """Whole walls of pieces that follow each other, where they overhang more and less."""
+    """Whole walls, joined from consecutive pieces of different overhang."""
     out = pieces[:1]
     for piece in pieces[1:]:
         if (piece[0] == out[-1][-1]).all():
@@ -87,7 +87,7 @@ def test_aligned_goes_on_beside_the_seam_below_unless_a_corner_is_close() -> Non
 
 
 def test_a_planned_corner_is_taken_whole_and_a_planned_place_on_a_side_draws_the_line_by_a_share() -> None:
-    """The outline's corner lies half a width outside the wall's on both sides."""
+    """The outline's corner lies half a width outside the wall's corner on both sides."""
     assert seam_of(SQUARE, "aligned", before=[(8.5, 0)], planned=[(10.225, -0.225)]) == (10, 0)
     assert seam_of(SQUARE, "aligned", before=[(3, 0)], planned=[(4, -0.225)]) == pytest.approx((3.3, 0))
 
@@ -149,7 +149,7 @@ def test_a_wall_stops_short_of_its_beginning_by_the_gap(gap: float, rule: str) -
 
 
 def distance_mm(seam: Floats, z: float, segments: Floats) -> float:
-    """From a point of the layer to the nearest of some segments in space, by brute force."""
+    """Distance from a point of the layer to the nearest of some segments in space, by brute force."""
     share = np.linspace(0, 1, 400)[:, None, None]
     points = segments[:, :3] + share * (segments[:, 3:] - segments[:, :3])
     return np.sqrt(((points - [*seam, z]) ** 2).sum(axis=2)).min()
@@ -166,7 +166,7 @@ def test_no_seam_lies_on_the_edge_where_a_later_part_begins() -> None:
 
 
 def outer(layer: Layer) -> list[Floats]:
-    """Outer walls that run round, with their stretches of other widths."""
+    """Closed outer walls, including their stretches of other widths."""
     walls = joined([p.points for p in layer.paths if p.kind is Kind.OUTER_WALL])
     return [points for points in walls if (np.abs(points[0] - points[-1]) < 0.2).all()]
 

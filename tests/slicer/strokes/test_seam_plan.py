@@ -1,4 +1,4 @@
-"""The plan of seams: hidden places are found, the line over the layers is the cheapest there is, joints are left alone."""
+"""The plan of seams: hidden positions are found, the line over the layers is the cheapest possible, joints stay free of seams."""
 
 from itertools import product
 
@@ -33,7 +33,7 @@ def planned(part: Part, *others: Part) -> list[Floats]:
 def test_the_seam_of_a_box_with_a_groove_lies_in_the_groove_s_corner() -> None:
     places = np.concatenate(planned(whole(standing(GROOVED))))
     assert np.abs(np.abs(places) - [7, 2]).max() < 0.05
-    assert np.abs(np.diff(places, axis=0)).max() < 0.05  # in one of the two
+    assert np.abs(np.diff(places, axis=0)).max() < 0.05  # in one of the two corners
     assert np.abs(np.abs(outer_seams(slice_part(whole(standing(GROOVED)), SETTINGS))) - [7, 2]).max() < 0.4
 
 
@@ -53,7 +53,7 @@ def test_the_seam_of_a_disc_lies_below_the_groove_at_the_front_of_what_stands_on
 
 
 def beside_a_wall(*more: m3.Manifold) -> Part:
-    """A cylinder whose middle is at x = -2, a wall at x = 9, and what joins them."""
+    """A cylinder centred at x = -2, a wall centred at x = 9, and the solids that join them."""
     wall = m3.Manifold.cube((2, 60, 20), True).translate((11, 0, 0))
     return whole(standing(m3.Manifold.batch_boolean([m3.Manifold.cylinder(20, 8, 8, 90, True), wall, *more], m3.OpType.Add)))
 
@@ -69,8 +69,9 @@ def test_the_seam_of_a_cylinder_lies_where_it_faces_a_wall_of_its_own_body() -> 
 def test_a_sharp_outer_corner_in_sight_beats_a_face_that_a_wall_half_hides_but_not_one_in_a_narrow_gap(
     gap_mm: float, x_mm: float, y_mm: float
 ) -> None:
-    """A half-round post turns its back, with two square corners, away from a wall. A face keeps about 1 - sin(atan(h / 2d)) of
-    its light beside an endless wall of height h at a distance d, in the middle of its height: 0.43 of it, and 0.01 in the gap."""
+    """A half-round post with two square corners, its flat back away from a wall. Beside an endless wall of height h at a
+    distance d, a face keeps about 1 - sin(atan(h / 2d)) of its light in the middle of its height: 0.43 of it, and 0.01 in the
+    gap."""
     post = m3.Manifold.cylinder(14, 6, 6, 92) ^ m3.Manifold.cube((12, 12, 14)).translate((0, -6, 0))
     wall = m3.Manifold.cube((2, 80, 14)).translate((6 + gap_mm, -40, 0))
     foot = m3.Manifold.cube((16 + gap_mm, 4, 1)).translate((-8, -2, -1))
@@ -120,7 +121,7 @@ def test_another_part_keeps_the_light_from_a_wall_that_it_stands_before() -> Non
 
 
 def test_a_flat_wall_gets_all_light_and_one_beside_an_inner_corner_half_of_it() -> None:
-    """A wall of no end square to another one takes half of the light from what is near the corner (its view factor)."""
+    """At the corner of an infinite wall perpendicular to another, half of the light is lost near the corner (its view factor)."""
     ell = m3.Manifold.cube((100, 100, 100)) - m3.Manifold.cube((50, 50, 100)).translate((50, 50, 0))
     of = sections(whole(standing(ell)))
     (loop,) = contours(of.outlines[250])

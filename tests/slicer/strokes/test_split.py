@@ -1,4 +1,4 @@
-"""Beads parted where they enter and leave a place: what shapely says lies in it, and nothing of the line lost."""
+"""Beads split at the border of a region: the inner pieces agree with shapely, and no length is lost."""
 
 from dataclasses import fields, replace
 from itertools import pairwise
@@ -22,7 +22,7 @@ INSIDE = Kind.INNER_WALL
 
 
 def walk(seed: int, steps: int = 30) -> Floats:
-    """A line that wanders over a ragged section and out of it."""
+    """A line that wanders into and out of a ragged section."""
     return np.cumsum(np.random.default_rng(seed).normal(0.0, 5.0, (steps, 2)), axis=0)
 
 
@@ -91,8 +91,8 @@ SQUARE = Polygons.square((10.0, 10.0))
         ([(2, 5), (8, 5)], [INSIDE]),
         ([(-9, 5), (-1, 5)], [Kind.OUTER_WALL]),
         ([(-5, 5), (0, 5), (5, 5)], [Kind.OUTER_WALL, INSIDE]),  # a corner on the border
-        ([(-3, 9.5), (0.5, 13)], [Kind.OUTER_WALL]),  # past a corner of the place
-        ([(-0.5, 5), (9, 5)], [INSIDE]),  # a millimetre outside would be too short a piece
+        ([(-3, 9.5), (0.5, 13)], [Kind.OUTER_WALL]),  # past a corner of the region
+        ([(-0.5, 5), (9, 5)], [INSIDE]),  # a millimetre outside is too short for a piece
         ([(-5, 5), (0.5, 5)], [Kind.OUTER_WALL]),
     ],
 )

@@ -1,4 +1,4 @@
-"""Strokes: a table that is refined keeps what belongs to each stroke."""
+"""Strokes: a refined table keeps the values of each stroke."""
 
 import numpy as np
 import pytest
@@ -71,6 +71,6 @@ def test_a_shortened_line_is_no_faster_than_the_hot_end_can_melt() -> None:
     strokes = strokes_of([Bead(Kind.SKIN, line, 0.42, 0)], np.array([True]), {}, 0.0)
     profile = load(settings=["process.skin_speed_mm_s=500", "process.least_layer_time_s=0"])
     printed, speeds = timed(strokes, profile, 0.2, None, 1.0)
-    assert printed.flow[0] > 1.0  # shorter, with the same plastic
+    assert printed.flow[0] > 1.0  # shorter with the same volume of plastic
     melted_mm3_s = speeds[0] * 0.2 * (0.42 - 0.2 * (1.0 - np.pi / 4.0)) * printed.flow[0]
     assert melted_mm3_s == pytest.approx(profile.material.volumetric_limit_mm3_s)

@@ -1,4 +1,4 @@
-"""Travels through the inside of a section, judged by shapely."""
+"""Travels through the inside of a section, checked by shapely."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_travels_leave_the_inside_where_shapely_says_so(seed: int) -> None:
 
 
 def _ways_mm(a: Floats, b: Floats, obstacle: shapely.Geometry) -> list[float]:
-    """Lengths of the shorter and of the longer way past a convex obstacle between two points: the sides of what encloses all."""
+    """Lengths of the shorter and the longer way past a convex obstacle between two points, along their common convex hull."""
     around = shapely.convex_hull(shapely.union(obstacle, shapely.MultiPoint([a, b]))).exterior
     half_round = abs(around.project(shapely.Point(a)) - around.project(shapely.Point(b)))
     return sorted([half_round, around.length - half_round])
@@ -60,7 +60,7 @@ def test_a_detour_past_a_convex_hole_is_the_shorter_way_round_pulled_taut(seed: 
     near, behind = (as_shapely(offset(hole, times * WIDTH)) for times in (SAFE, BEHIND))
     assume(shapely.LineString([a, b]).crosses(near))
     (least, _), (most, longer) = _ways_mm(a, b, near), _ways_mm(a, b, behind)
-    assume(longer > most + 1.0)  # which of two nearly equal ways is taken depends on how they lie along the border
+    assume(longer > most + 1.0)  # the choice between nearly equal ways depends on their course along the border
     detour = Combing(plate, WIDTH).detour(a, b, 1000.0)
     assert detour is not None
     assert least - 1e-6 <= shapely.LineString([a, *detour, b]).length <= most + 1e-6

@@ -1,4 +1,4 @@
-"""Vase: a bottom, then one wall that climbs without a seam; what cannot be one is refused with the reason."""
+"""Vase: a bottom, then one rising wall without a seam; unsuitable parts are refused with the reason."""
 
 from itertools import pairwise
 

@@ -1,4 +1,4 @@
-"""Wipes beside the edge of an interface: they stay off the outer wall unless the stroke itself ends on it."""
+"""Wipes beside the edge of an interface: they avoid the outer wall unless the stroke itself ends on it."""
 
 import numpy as np
 import pytest

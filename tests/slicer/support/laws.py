@@ -1,4 +1,4 @@
-"""What every support must obey, judged by shapely from the printed areas alone."""
+"""Laws of every support, checked by shapely from the printed areas alone."""
 
 from collections.abc import Sequence
 from math import radians, tan
@@ -15,18 +15,18 @@ from tests.slicer.hand import as_shapely, profile
 
 ROUNDING_MM = 0.03
 SPECK_MM2 = 0.02
-LEDGE = 2.0  # line widths that carry themselves
+LEDGE = 2.0  # self-supporting ledge, line widths
 
 
 def supported(part: Part, *settings: str, earlier: Sequence[Part] = ()) -> tuple[list[Overhang], Supports]:
-    """What overhangs of a part, and its own support."""
+    """Overhangs of a part, and its own support."""
     sections = section_part(part, profile(*settings), earlier)
     overhangs = find_overhangs(sections)
     return overhangs, own_supports(sections, overhangs)
 
 
 def assert_sound(overhangs: Sequence[Overhang], supports: Supports) -> None:
-    """Gaps are kept, everything stands within the lean, every hanging place is held or reported as missed."""
+    """Gaps are kept, everything rests within the lean, every overhang is held or reported as missed."""
     sections, process = supports.sections, supports.sections.process
     solid, printed, missed, hanging = (
         [shapely.make_valid(as_shapely(area)) for area in places]
@@ -65,7 +65,7 @@ def assert_sound(overhangs: Sequence[Overhang], supports: Supports) -> None:
 
 
 def _standing_room(solid: Any, width_mm: float) -> Any:
-    """Where support may stand on plastic."""
+    """Area of plastic on which support may rest."""
     return solid.buffer(width_mm + 4 * ROUNDING_MM, join_style="mitre")
 
 

@@ -1,4 +1,4 @@
-"""Branches by themselves: what shrinking, joining and meeting do to their places, judged by shapely and by all pairs."""
+"""Branches alone: where shrinking, joining and meeting move them, checked by shapely and over all pairs."""
 
 import numpy as np
 import pytest
@@ -24,7 +24,7 @@ seeds = st.integers(0, 10**6)
 
 
 def in_the_open(lean_mm: float) -> ReachableAreas:
-    """Two layers of 0.2 mm with nothing in the way of branches."""
+    """Two layers of 0.2 mm without obstacles for branches."""
     wide, cuts_mm = Polygons.square((200.0, 200.0), True), np.array([0.1, 0.3])
     sections = sections_at(box(1, 1, 1), cuts_mm)
     return ReachableAreas(sections, np.full(2, lean_mm), (Polygons(), Polygons()), (wide, wide))
@@ -74,7 +74,7 @@ def test_trunks_go_half_way_to_the_nearest_one_that_they_can_meet_in_time(seed: 
     areas = in_the_open(reach)
     thick_mm = trunk_radius_mm(areas.process, areas.radius_mm)
     lower = lower_branches([trunk(x, y, thick_mm) for x, y in at.tolist()], areas, 1)
-    places = {tuple(np.round(place, 6)) for place in expected}  # of two that have met one is left
+    places = {tuple(np.round(place, 6)) for place in expected}  # two that have met become one
     assert {(round(b.x, 6), round(b.y, 6)) for b in lower} == places
 
 

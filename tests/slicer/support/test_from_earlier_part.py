@@ -1,4 +1,4 @@
-"""Support handed down: it stands on what was printed before it, below every later base plane, and holds what it is for."""
+"""Support from an earlier part: it rests on earlier plastic, stays below every later base plane, and holds its overhang."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,7 +28,7 @@ STANDS_MM = 0.55  # a layer, a step of a slope and the space beside a line
 ROUNDING_MM = 0.03
 PROPS = (Kind.SUPPORT, Kind.SUPPORT_INTERFACE)
 LOW = (0.0, 0.0, 1.0)
-# Shapes with an arm over nothing but air, and the planes that cut them: level, tilted, upright, one below the other.
+# Shapes with an arm over air only, and the planes that cut them: level, tilted, upright, one below the other.
 ARM = m3.Manifold.cube((8, 8, 40)) + m3.Manifold.cube((30, 8, 5)).translate((0, 0, 32))
 HIGH = (
     m3.Manifold.cube((8, 8, 70))
@@ -166,7 +166,7 @@ def lattice(area: shapely.Geometry) -> Sequence[shapely.Point]:
 
 
 def stands_on(point: Floats, below: Supports) -> bool:
-    """Whether a point of a part's frame has plastic of that part or its support nearly beneath it."""
+    """Whether a point of a part's frame has plastic of that part or its support closely beneath it."""
     x, y, z = point
     heights = below.sections.heights
     near = np.flatnonzero((heights.tip_mm > z - STANDS_MM) & (heights.bottom_mm < z + 0.2))

@@ -1,4 +1,4 @@
-"""Support, compensation and plastic of decompositions whose limbs are printed beside what stands."""
+"""Support, compensation and plastic of decompositions whose limbs are printed beside standing plastic."""
 
 from dataclasses import replace
 
@@ -23,7 +23,7 @@ BASE_MM = 8.0
 
 
 def bars() -> Decomposition:
-    """Three posts with bars on their tops, up to 24 mm, the right one printed last from 8 mm on."""
+    """Three posts with bars on their tops, up to 24 mm; the right one is printed last from 8 mm up."""
     mesh = posts(-40.0, 0.0, 40.0, bar_mm=16.0)
     return decomposed(mesh, load(), limb(mesh, [(48.0, 0.0, 24.0)], (0.0, 0.0, BASE_MM)))
 
@@ -56,7 +56,7 @@ def test_support_of_a_part_keeps_off_the_head_that_prints_a_limb_and_no_farther(
     tips = np.array([7.0, 8.5, 11.0, 23.0])
     blocked = above_base_planes(first, [last], Heights(tips, np.full(4, 0.2), tips - 0.1), 0.3, 100.0, MACHINE)
     left = [-area.bounds()[0] if not area.is_empty() else None for area in blocked]
-    edge_mm = -32.0 + AROUND_MM + MACHINE.clearance_mm  # of the limb's room, at x = 27 on the left, with the clearance
+    edge_mm = -32.0 + AROUND_MM + MACHINE.clearance_mm  # of the limb's space, at x = 27 on the left, with the clearance
     assert left[0] is None
     expected = [2.5, 11.5, 15.0]  # radii of the silhouette of the head at 2, 4.5 and 16 mm above the tip
     assert left[1:] == pytest.approx([edge_mm + radius for radius in expected], abs=0.05)
@@ -84,7 +84,7 @@ def test_where_the_head_prints_a_limb_begins_under_its_shadow_and_widens_with_th
 
 
 def tower_beside_a_bar() -> Decomposition:
-    """A post with a bar from -24 to 0 mm and a tower of 40 mm from 19.5 mm on; the bar's post is printed last from 10 mm on."""
+    """A post with a bar from -24 to 0 mm and a tower of 40 mm from 19.5 mm; the bar's post is printed last from 10 mm up."""
     solid = m3.Manifold.cube((90.0, 30.0, 4.0), True).translate((0.0, 0.0, 2.0))
     solid += m3.Manifold.cube((8.0, 8.0, 22.0), True).translate((-12.0, 0.0, 13.0))
     solid += m3.Manifold.cube((24.0, 8.0, 4.0), True).translate((-12.0, 0.0, 24.0))

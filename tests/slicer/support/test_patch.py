@@ -1,4 +1,4 @@
-"""What an earlier part's layers do under a place of a later base plane, judged by heights and by shapely."""
+"""Layers of an earlier part under a region of a later base plane, checked by heights and by shapely."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A model on a pedestal: the pedestal is printed like a raft, with a gap, and the model as if it stood on the platform."""
+"""A model on a pedestal: the pedestal is printed like a raft, with a gap, and the model as if on the build plate."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""Why a place gets no support: for every reason a part that has it."""
+"""Reasons why a region gets no support, each with a part that has it."""
 
 import manifold3d as m3
 import numpy as np
@@ -15,7 +15,7 @@ BLOCK = m3.Manifold.cube
 
 
 def pit(width_mm: float, deep_mm: float) -> Part:
-    """A block with a closed chamber, whose ceiling is too wide for the bridges that are allowed."""
+    """A block with a closed chamber whose ceiling is too wide for the longest allowed bridge."""
     chamber = BLOCK((width_mm, 16, deep_mm)).translate((10 - 0.5 * width_mm, 2, 15 - deep_mm))
     return whole(standing(BLOCK((20, 20, 20)) - chamber))
 

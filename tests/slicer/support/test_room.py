@@ -1,4 +1,4 @@
-"""Where support has room: layers within gaps counted one by one, later parts' planes point by point."""
+"""Space for support: the layers within gaps counted one by one, later parts' planes point by point."""
 
 import numpy as np
 import pytest
@@ -21,7 +21,7 @@ from tests.slicer.hand import as_shapely, profile, ragged, whole
 
 
 def areas(*settings_: str) -> ReachableAreas:
-    """Of a box of 20 mm in layers of 0.2 mm, with nothing looked up yet."""
+    """Reachable areas of a box 20 mm high in layers of 0.2 mm, with nothing cached yet."""
     sections = section_part(whole(box(10, 10, 20)), profile(*settings_))
     return ReachableAreas(sections, 0.2 * np.ones(100), (), ())
 
@@ -39,7 +39,7 @@ def test_support_keeps_its_gaps_to_the_layers_above_and_below(layer: int) -> Non
     carrying = list(room.carrying_layers(layer))
     fitting = [m for m in range(count) if top[m] <= bottom[layer] - 0.4 + 1e-6]
     assert carrying[:1] == fitting[-1:]
-    slack_mm = 0.3  # as much as the distance beside, at a slope of 45 degrees
+    slack_mm = 0.3  # equal to the horizontal distance at a slope of 45 degrees
     assert set(carrying[1:]) == {m for m in fitting[:-1] if top[m] >= bottom[layer] - 0.4 - slack_mm - 1e-6}
 
 

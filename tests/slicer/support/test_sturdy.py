@@ -1,4 +1,4 @@
-"""No piece of support is too slender for what stands on it; thick trunks are hollow: judged from the printed areas alone."""
+"""No piece of support is too slender for its load, and thick trunks are hollow: checked from the printed areas alone."""
 
 from collections.abc import Sequence
 from math import pi, radians, sqrt, tan
@@ -23,7 +23,7 @@ from tests.slicer.hand import profile, whole
 from tests.slicer.support.laws import assert_sound, supported
 from tests.slicer.support.test_tree import bored_bracket
 
-SHORT_MM = 2.0  # roots of what stands on the part are thinner over no more than this
+SHORT_MM = 2.0  # roots of support on the part may be thinner over no more than this
 
 
 def gallows(arm_mm: float, height_mm: float, wall_mm: float = 0.0) -> Mesh:
@@ -35,7 +35,7 @@ def gallows(arm_mm: float, height_mm: float, wall_mm: float = 0.0) -> Mesh:
 
 
 def height_of_slender_support_mm(areas: Sequence[Polygons], layer_mm: float, most: float) -> float:
-    """The greatest height over which pieces follow each other that have more above them than so many of their diameters."""
+    """The greatest height of consecutive pieces that carry more height than `most` times their diameters."""
     above: list[tuple[Polygons, float, float]] = []
     highest = 0.0
     for m in range(len(areas) - 1, 0, -1):
@@ -52,7 +52,7 @@ def height_of_slender_support_mm(areas: Sequence[Polygons], layer_mm: float, mos
 
 
 def height_of_thin_support_mm(areas: Sequence[Polygons], layer_mm: float) -> float:
-    """The greatest height over which pieces of support below 2 mm2 follow each other."""
+    """The greatest height of consecutive pieces of support below 2 mm2."""
     highest, below = 0.0, list[tuple[Polygons, float]]()
     for area in areas:
         thin = [piece for piece in islands(area) if piece.area() < 2.0]

@@ -1,4 +1,4 @@
-"""Support stands where faces hang, on something, within its lean, and out of the way."""
+"""Support lies under overhangs, rests on plastic or the plate within its lean, and keeps its distances."""
 
 from collections.abc import Callable
 
@@ -36,7 +36,7 @@ def support_points(sliced: SlicedPart) -> Floats:
 
 
 def lines_right_of_the_stem(layer: Layer, kind: Kind) -> Floats:
-    """Where the long straight lines along y of a kind lie, x > 0 rising, mm."""
+    """Positions of the long straight lines along y of a kind with x > 0, ascending, mm."""
     paths = [path.points for path in layer.paths if path.kind is kind]
     sides = np.concatenate([np.hstack([points[:-1], points[1:]]) for points in paths])
     along_y = (np.abs(sides[:, 2] - sides[:, 0]) < 1e-6) & (np.abs(sides[:, 3] - sides[:, 1]) > 5.0) & (sides[:, 0] > 0.0)
@@ -50,7 +50,7 @@ def table(span: float, depth: float = 5.0, height: float = 10.0) -> Mesh:
 
 
 def funnel(angle: float) -> Mesh:
-    """A pyramid on its head whose four faces hang over by an angle from upright."""
+    """A pyramid on its tip whose four faces overhang by an angle from upright."""
     return standing(m3.Manifold.cylinder(6, 5, 5 + 6 * np.sqrt(2) * np.tan(np.radians(angle)), 4).rotate((0, 0, 45)))
 
 
@@ -133,7 +133,7 @@ def test_a_rim_that_gets_thick_enough_for_a_line_in_mid_air_hangs_there() -> Non
     sections = section_part(whole(standing(bell + m3.Manifold.cylinder(22, 3, 3, 64))), profile())
     first = next(i for i, outline in enumerate(sections.outlines) if outline.bounds()[2] > 5.0)
     ring = sections.outlines[first] - Polygons.circle(4.0, 32)
-    assert 0.16 < ring.area() / (2.0 * np.pi * 8.0) < 0.18  # as thick as the thinnest that gets a line all along
+    assert 0.16 < ring.area() / (2.0 * np.pi * 8.0) < 0.18  # as thick as the thinnest ring that gets a line all along
     assert find_overhangs(sections)[first].hanging.area() == pytest.approx(ring.area(), rel=0.01)
 
 
@@ -200,7 +200,7 @@ def test_a_hanging_face_that_no_support_fits_under_is_told_unless_the_plastic_be
     drawer = m3.Manifold.cube((30, 30, 10)) - m3.Manifold.cube((20, 20, 0.7)).translate((5, 5, 5))
     sliced = slice_part(whole(standing(drawer)), profile("process.bridge_longest_mm=1", "process.support_bottom_gap_mm=0.6"))
     (face,) = sliced.unsupported
-    assert face.mm2 == pytest.approx((20.0 - 2.0 * LINE_MM) ** 2, rel=0.02)  # a line along each side lies on what is below
+    assert face.mm2 == pytest.approx((20.0 - 2.0 * LINE_MM) ** 2, rel=0.02)  # a line along each side lies on the plastic below
     assert sliced.layers[face.layer - 1].z_mm == pytest.approx(6.0)
     assert face.reason == "there is no room for support between it and the plastic below"
 

@@ -1,4 +1,4 @@
-"""Branches stay simple shapes however far they go down past holes and walls."""
+"""Branches keep simple outlines however far they continue downward past holes and walls."""
 
 import manifold3d as m3
 import numpy as np
@@ -15,7 +15,7 @@ LEAN_MM = 0.2
 
 
 def bored_bracket(seed: int, holes: int = 12) -> Mesh:
-    """A block with an arm, bored in all directions: edges of holes run close to its walls."""
+    """A block with an arm, bored in all directions: edges of holes are close to its walls."""
     rng = np.random.default_rng(seed)
     solid = m3.Manifold.cube((30, 16, 24)) + m3.Manifold.cube((50, 16, 5)).translate((0, 0, 19))
     for _ in range(holes):

@@ -1,4 +1,4 @@
-"""Brims, skirts and the base: closed formulas of the section modulus, who needs a brim, the first layer's outline."""
+"""Brims, skirts and the base: closed formulas of the section modulus, parts that need a brim, the first layer's outline."""
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ def test_the_section_modulus_of_a_rectangle(b: float, h: float, turn_deg: float,
 
 
 def test_a_strip_of_5_by_20_mm_holds_a_push_at_16_mm_but_not_at_17() -> None:
-    """1 N there against 0.2 N/mm2 over 80.8 mm3."""
+    """A push of 1 N at 16 mm against 0.2 N/mm2 over 80.8 mm3."""
     assert [tips_over(Polygons.square((5, 20)), height_mm) for height_mm in (14, 16, 17)] == [False, False, True]
 
 

@@ -1,4 +1,4 @@
-"""Fuzzy skin: rough where and as much as the settings ask for, and even where parts meet."""
+"""Fuzzy skin: rough only where the settings request it and by their amount, and smooth where parts meet."""
 
 import manifold3d as m3
 import numpy as np
@@ -12,11 +12,11 @@ from tests.slicer.hand import SOLID, content, cut, profile, whole
 
 FUZZY = (*SOLID, "process.fuzzy_skin=external", "process.fuzzy_skin_thickness_mm=0.3")
 DISTANT = "process.fuzzy_skin_point_distance_mm=5"
-SIDE = 10.0 - 0.225  # distance of the outer wall's middle from the axis of a block of 20 mm
+SIDE = 10.0 - 0.225  # distance of the outer wall's centreline from the axis of a block of 20 mm
 
 
 def off_mm(sliced: SlicedPart, layer: int, kind: Kind = Kind.OUTER_WALL) -> Floats:
-    """By how much points of walls lie outside the line that they have in an even block."""
+    """Distance of wall points outside their line in a smooth block."""
     paths = [path for path in sliced.layers[layer].paths if path.kind is kind]
     return np.concatenate([np.abs(path.points).max(axis=1) for path in paths]) - SIDE
 
@@ -49,7 +49,7 @@ def test_points_of_a_rough_wall_are_as_far_apart_as_is_asked_for() -> None:
     ("walls", "holes", "inner"), [("external", False, False), ("all", True, False), ("allwalls", True, True)]
 )
 def test_the_setting_says_which_walls_are_rough(walls: str, holes: bool, inner: bool) -> None:
-    """The frame has an outside, a hole and two inner walls along each."""
+    """The frame has an outer outline and a hole, each with two inner walls."""
     frame = standing(m3.Manifold.cube((20, 20, 2), True) - m3.Manifold.cube((10, 10, 9), True))
     even, rough = (slice_part(whole(frame), profile(*SOLID, f"process.fuzzy_skin={name}")).layers[4] for name in ("none", walls))
     changed = {kind: len(points_of(rough, kind) - points_of(even, kind)) for kind in (Kind.OUTER_WALL, Kind.INNER_WALL)}
@@ -73,7 +73,7 @@ def test_walls_at_a_cut_stay_even_and_the_same_input_gives_the_same_walls() -> N
 
 
 def test_the_face_of_a_cut_stays_even_in_all_layers() -> None:
-    """The lower part of a block that is cut at 45 degrees: points on the slope lie on the cut, all others do not."""
+    """The lower part of a block cut at 45 degrees: points on the slope lie on the cut, all others do not."""
     below, above = cut(box(20, 20, 20), ((1, 0, 1), 10.0 * 2**0.5))
     sliced = slice_part(below, profile(*FUZZY), (), [above])
     layer = sliced.layers[60]

@@ -1,4 +1,4 @@
-"""Beads in gaps lie in the middle of their place and fill it with its area times height of plastic."""
+"""Beads in gaps lie in the middle of their gap and fill it with its area times height of plastic."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,7 +27,8 @@ WIDTH, HEIGHT = 0.45, 0.2
 
 
 def strips(beads: Sequence[Bead]) -> list[tuple[shapely.LineString, float]]:
-    """The middle of every piece as it is printed, and its cross-section over the height, mm: as wide a place it fills."""
+    """The centreline of every piece as it is printed, and its cross-section area over the height, mm: the width of gap that it
+    fills."""
     placed = [bead if bead.course is None else replace(bead, points=bead.course[:, :2]) for bead in beads]
     pieces = in_pieces(strokes_of(placed, np.zeros(len(beads), np.bool_), {}, 0.0), HEIGHT)
     return [(shapely.LineString(row.points), bead_area_mm2(row.width_mm, HEIGHT) / HEIGHT) for row in rows_of(pieces)]
@@ -63,7 +64,7 @@ def test_what_is_narrower_than_the_least_gap_stays_empty() -> None:
 
 
 @settings(max_examples=25, deadline=None)
-@example(3.0, 0.5, 0.5, 0.0)  # all middles of the triangles at an end fall together
+@example(3.0, 0.5, 0.5, 0.0)  # all centres of the triangles at an end coincide
 @given(st.floats(3.0, 15.0), st.floats(0.15, 0.55), st.floats(0.15, 0.55), st.floats(0.0, 180.0))
 def test_the_line_in_a_wedge_runs_in_its_middle_and_is_as_wide_as_it(
     length: float, start: float, end: float, turn: float

@@ -1,4 +1,4 @@
-"""One wall round tops and in the first layer: skin takes the place of the inner walls there, and only there."""
+"""One wall around tops and in the first layer: skin replaces the inner walls there, and only there."""
 
 import manifold3d as m3
 import pytest
@@ -38,7 +38,7 @@ def test_only_the_last_layer_of_a_block_has_one_wall_round_its_top() -> None:
 
 
 def test_a_step_has_one_wall_and_what_stands_on_it_has_all_walls_below() -> None:
-    """The inner walls under a block of 10 mm turn round that block, in place of the plate of 20 mm."""
+    """The inner walls under a block of 10 mm follow that block instead of the plate of 20 mm."""
     sliced = slice_part(whole(stepped(10)), profile(*SOLID, "process.only_one_wall_top=true"))
     assert inner_wall_mm(sliced, 3) == pytest.approx(two_inner_walls_mm(20), abs=0.5)
     assert inner_wall_mm(sliced, 4) == pytest.approx(4 * sum(10 - (2 * k - 1) * SPACING for k in (1, 2)), abs=0.5)

@@ -1,4 +1,4 @@
-"""Variable walls fill a place with as many beads as fit, within the nozzle's range, and stay inside it."""
+"""Variable walls fill a region with as many beads as fit, within the nozzle's range, and stay inside it."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -37,14 +37,14 @@ def plate(thickness: float, length: float = 12.0) -> Polygons:
 
 
 def plastic(walls: Sequence[Wall]) -> shapely.Geometry:
-    """What walls cover, laid in pieces of one width as they are printed."""
+    """Area that walls cover, printed in pieces of one width."""
     beads = [Bead(Kind.OUTER_WALL, wall.course[:, :2], mean_width_mm(wall.course), 0, course=wall.course) for wall in walls]
     pieces = in_pieces(strokes_of(beads, np.zeros(len(beads), np.bool_), {}, 0.0), HEIGHT)
     return shapely.union_all([shapely.LineString(row.points).buffer(0.5 * row.width_mm) for row in rows_of(pieces)])
 
 
 def across(walls: Sequence[Wall], x: float) -> int:
-    """How many beads lie side by side at x."""
+    """Number of beads side by side at x."""
     line = shapely.LineString([(x, -50), (x, 50)])
     met = [line.intersection(shapely.LineString(wall.course[:, :2])) for wall in walls]
     return sum(int(shapely.get_num_geometries(met_wall)) for met_wall in met if not met_wall.is_empty)
@@ -122,7 +122,7 @@ def test_without_walls_a_place_too_narrow_for_a_fill_gets_one_bead_and_the_rest_
 
 def test_a_wall_that_is_now_thicker_and_now_thinner_than_the_least_bead_is_laid_from_end_to_end() -> None:
     x = np.linspace(0, 30, 121)
-    side = 0.12 + 0.02 * np.sin(2.0 * x)  # of half the least bead: 0.2 to 0.28 mm thick, 0.24 mm is the least
+    side = 0.12 + 0.02 * np.sin(2.0 * x)  # half of the thickness, which is 0.2 to 0.28 mm; the least bead is 0.24 mm
     walls = variable_walls([Polygons([np.concatenate([np.column_stack([x, -side]), np.column_stack([x, side])[::-1]])])], RULE)
     assert len(walls) == 1
     assert length_mm(walls[0].course) > 29.0
@@ -165,7 +165,7 @@ def test_all_beads_of_any_polygon_lie_in_it_with_widths_a_nozzle_prints(points: 
 
 
 def rest(section: Polygons) -> shapely.Geometry:
-    """What of a section neither walls nor what they enclose cover, but for slits of 0.02 mm, by shapely."""
+    """The part of a section that neither walls nor their inside cover, except for slits of 0.02 mm, by shapely."""
     walled = layer_walls(section, 3, PROCESS, HEIGHT, NOZZLE)
     loops = [shapely.LineString(close_loop(loop)).buffer(0.5 * WIDTH) for level in walled.loops for loop in level]
     filled = shapely.union_all([*loops, plastic(walled.varying), as_shapely(walled.inside)])
@@ -202,7 +202,7 @@ def test_the_tip_of_a_sharp_corner_is_filled(tip_deg: float) -> None:
 @pytest.mark.parametrize("corners", [16, 48, 96])
 @pytest.mark.parametrize("diameter", [0.7, 1.5, 2.5])
 def test_the_rings_of_a_circle_never_turn_back(corners: int, diameter: float) -> None:
-    """The two sides at each of its points are as near to its middle as each other, but for rounding."""
+    """At each point the two sides of a circle are equally near to its centre, except for rounding."""
     for wall in variable_walls([Polygons.circle(0.5 * diameter, corners)], RULE):
         around = np.diff(np.unwrap(np.arctan2(*wall.course[:, 1::-1].T)))
         assert (around > -1e-6).all()

@@ -1,4 +1,4 @@
-"""Walls of one width lie at their distances from the outline, and turn round only where a pair of them has room."""
+"""Walls of one width lie at their distances from the outline, and are printed only where a pair of them fits."""
 
 import manifold3d as m3
 import numpy as np
@@ -90,13 +90,13 @@ def test_five_thousand_holes_are_walled() -> None:
 
 
 def test_where_no_pair_of_walls_has_room_none_turns_round() -> None:
-    bar = rectangle(20, 1.5 * WIDTH).translate((9.0, 4.0))  # beside a block, which has room
+    bar = rectangle(20, 1.5 * WIDTH).translate((9.0, 4.0))  # beside a block that is wide enough
     for loop in walls(rectangle(10, 10) + bar, 3, PROCESS, HEIGHT).loops[0]:
         assert loop[:, 0].max() < 10.0
 
 
 def test_between_all_walls_a_place_narrower_than_two_lines_is_narrow_and_a_wider_one_inside() -> None:
-    around = WIDTH + 5 * SPACING  # what three walls take of a plate from both sides
+    around = WIDTH + 5 * SPACING  # width that three walls on both sides take of a plate
     slim, roomy = (walls(rectangle(20, around + lines * SPACING), 3, PROCESS, HEIGHT) for lines in (1.7, 2.3))
     assert slim.inside.is_empty()
     assert slim.narrow.area() == pytest.approx((20 - around) * 1.7 * SPACING, rel=0.01)

@@ -1,4 +1,4 @@
-"""The batch command: rows and files of a folder's models, what is done again and what is not, what is refused."""
+"""The batch command: the rows and files of a folder's models, which models are processed again, and refusals."""
 
 import csv
 import signal
@@ -34,7 +34,7 @@ def models(folder: Path, **meshes: Mesh) -> Path:
 
 
 class ThisProcess:
-    """Does in this process what a batch gives to its workers, each of which takes a second to start."""
+    """Runs in this process the calls of a batch, because each worker takes a second to start."""
 
     def completed(self, task: Callable[..., Any], calls: Mapping[str, Any], _: Any) -> Iterator[tuple[str, Any]]:
         return ((name, task(*given)) for name, given in calls.items())
@@ -145,7 +145,7 @@ def test_after_ctrl_c_no_process_is_left_and_the_batch_goes_on(tmp_path: Path) -
 
 
 def children_of(pid: int) -> list[Path]:
-    """Where the system tells of the processes that a process has begun."""
+    """Folders in /proc of a process's children."""
     threads = Path(f"/proc/{pid}/task").glob("*/children")
     return [Path("/proc") / child for thread in threads for child in thread.read_text().split()]
 

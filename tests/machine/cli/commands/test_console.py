@@ -1,4 +1,4 @@
-"""`tiltprint console`: through a pipe and at a terminal, with a safe end whatever happens."""
+"""`tiltprint console` through a pipe and at a terminal; it always ends safely."""
 
 import io
 import os
@@ -30,7 +30,7 @@ from tests.machine.peers import happened, hear_out, on_terminal, scripted
 from tests.machine.person import Person
 
 MACHINE = load().machine
-PROMPT = ">"  # the space after it is a move of the cursor
+PROMPT = ">"  # the space after the prompt is a cursor movement
 NAMED = {"M115": "FIRMWARE_NAME:Marlin 2.1.2\nok", "M114": "X:0.00 Y:0.00 Z:0.00 A:0.00 C:0.00 E:0.00\nok", "M110": "ok"}
 COLD = "ok T:20.00 /0.00 B:20.00 /0.00"
 Capsys = pytest.CaptureFixture[str]
@@ -51,7 +51,7 @@ def piped(monkeypatch: pytest.MonkeyPatch) -> Piped:
 
 @pytest.fixture
 def done(piped: Piped) -> Done:
-    """The same on a simulated printer, with what that has done."""
+    """Exit code of a console on a simulated printer, and the printer's record."""
 
     def run(text: str, *options: str) -> tuple[int, Record]:
         with SimulatedPrinter(MACHINE) as printer:
@@ -70,7 +70,7 @@ def test_lines_of_a_pipe_are_sent_and_answers_are_shown(done: Done, capsys: Caps
 
 
 def test_a_klipper_that_has_shut_down_can_be_restarted(piped: Piped, capsys: Capsys) -> None:
-    """It answers M115, M110 and M105; everything else but the restart is refused."""
+    """The simulated Klipper answers M115, M110 and M105 and refuses everything else but the restart."""
     refused = "// MCU 'mcu' shutdown: Timer too close\n// Printer is shutdown\n!! MCU 'mcu' shutdown: Timer too close\nok"
     known = {"M115": "ok FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.13.0", "M110": "ok", "M105": "ok T:0"}
     with on_terminal(scripted({**known, "FIRMWARE_RESTART": "ok\n// Klipper state: Disconnect"}, refused)) as path:
@@ -169,7 +169,7 @@ def test_a_person_types_gets_help_and_leaves_with_ctrl_d() -> None:
         person.see("/stop     emergency stop (M112) at once")
         person.press("/fly\n")
         person.see("/fly is not known: /help, /reports, /stop and /quit are")
-        person.see(PROMPT)  # without a reader at the terminal an end of input is nobody's
+        person.see(PROMPT)  # while no prompt reads the terminal, an end of input is ignored
         person.press("\x04")
         assert person.end() == 0
     assert "\x1b[2mok" in person.raw
@@ -180,7 +180,7 @@ def test_a_line_that_comes_just_as_the_prompt_begins_is_written_by_the_prompt(ca
 
     class Late(PromptSession[str]):
         def prompt(self, *arguments: Any, **options: Any) -> str:
-            shown.write("ok")  # written now, it would follow the prompt on its line, and no new prompt would come
+            shown.write("ok")  # written now, it would follow the prompt on its line, and no new prompt would be shown
             early.append(capsys.readouterr().out)
             line = super().prompt(*arguments, **options)
             early.append(capsys.readouterr().out)
@@ -208,7 +208,7 @@ def test_ctrl_c_while_the_printer_heats_leaves_with_the_heaters_off() -> None:
     with Person("console", "--port", "sim", "--sim-speed", "2") as person:
         person.see(PROMPT)
         person.press("M109 S200\n")
-        person.see("W:?")  # the prompt waits for keys by now
+        person.see("W:?")  # by now the prompt waits for keys
         person.see("W:?")
         person.press("\x03")
         person.see("switched off: heaters, because a command was running")
@@ -262,7 +262,7 @@ def test_an_interrupt_while_a_line_is_put_above_the_prompt_ends_the_prompt(monke
 
 def test_the_end_of_a_closed_terminal_that_comes_before_its_signal_is_an_interrupt(monkeypatch: pytest.MonkeyPatch) -> None:
     console = _Console(None, None, False)
-    monkeypatch.setattr(sys, "stdin", io.StringIO())  # as a terminal that was closed: no terminal any more
+    monkeypatch.setattr(sys, "stdin", io.StringIO())  # like a closed terminal, which is no longer a tty
 
     def at_end(_prompt: object) -> str:
         raise EOFError
@@ -292,7 +292,7 @@ def test_a_bug_while_a_line_is_sent_ends_the_console_with_the_heaters_off(
         prompt: PromptSession[str] = PromptSession(input=keys, output=DummyOutput())
         monkeypatch.setattr(console, "_prompt_session", lambda: prompt)
         keys.send_text("M104 S200\nM503\n")
-        later = Timer(10.0, keys.send_text, ("/quit\n",))  # nobody types it where the console ends by itself
+        later = Timer(10.0, keys.send_text, ("/quit\n",))  # not reached if the console ends by itself
         later.start()
         code = main(["console", "--port", printer.path])
         later.cancel()
@@ -301,7 +301,7 @@ def test_a_bug_while_a_line_is_sent_ends_the_console_with_the_heaters_off(
     assert "ZeroDivisionError: planted; the printer reports its heaters off" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("after_s", [0.002, 0.6])  # in the midst of putting the answer above the prompt, or at rest
+@pytest.mark.parametrize("after_s", [0.002, 0.6])  # while the answer is being put above the prompt, or at rest
 def test_a_closed_terminal_leaves_with_the_heaters_off(after_s: float) -> None:
     with SimulatedPrinter(MACHINE) as printer:
         with Person("console", "--port", printer.path) as person:

@@ -1,4 +1,4 @@
-"""The edit command: what a browser is started with."""
+"""The edit command: how it starts a browser."""
 
 import stat
 import webbrowser

@@ -1,4 +1,4 @@
-"""One layer's picture from the command line."""
+"""The export command and the picture of one layer."""
 
 import re
 import xml.etree.ElementTree as ET
@@ -82,7 +82,7 @@ def test_export_without_a_name_writes_the_model_s_here_and_ends_with_a_verdict(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("box.stl").write_bytes(stl(box(8, 8, 2)))
-    for _ in range(2):  # one of its own it writes over
+    for _ in range(2):  # a file that tiltprint wrote is overwritten
         assert main(["export", "box.stl", *FAST, "--as-is"]) == 0
         assert capsys.readouterr().out.endswith("wrote box.gcode: ready to print, 1 warning\n")
     Path("box.gcode").write_text("G28\n")

@@ -1,4 +1,4 @@
-"""A plan is kept, edited and used again: the same parts and the same G-code without a search."""
+"""Plans that are saved, edited and reused: the same parts and the same G-code without a search."""
 
 import json
 from pathlib import Path
@@ -16,14 +16,14 @@ from tests.mdp.files import painted_ply
 
 FAST = ["--set", "search.directions=60", "--set", "process.layer_height_mm=0.4", "--set", "process.first_layer_height_mm=0.4"]
 FAST += ["--set", "process.line_width_mm=0.8", "--set", "process.scale=0.6", "--set", "process.infill_density=0.05"]
-# So small an arm, whose stairs and seam count nearly as much as support, is cut all the same.
+# An arm this small, whose stair-stepping and seam cost nearly as much as its support, is still cut.
 FAST += ["--set", "search.seam_mm=0.8", "--set", "search.stair_weight=0.01", "--set", "search.least_saving=0"]
 FAST += ["--set", "search.cut_mm2=20", "--set", "search.beam_width=2"]
 PARTS = ["part-01.stl", "part-02.stl", "decomposition.3mf"]
 
 
 def _run(*arguments: str) -> None:
-    """A command that prints the model as it is, unless its arguments say otherwise."""
+    """Run a command that keeps the model's orientation, unless its arguments say otherwise."""
     assert main([arguments[0], "--as-is", *arguments[1:], *FAST]) == 0
 
 
@@ -68,7 +68,7 @@ def test_settings_of_a_part_are_kept_in_the_plan_and_change_what_is_written(
     assert "part 2 with walls = 1" in capsys.readouterr().out
     _run("export", "box.stl", "--plan", "box.toml", "--part", "2:walls=4", "-o", "four.gcode")
     walls = [Path(f"{name}.gcode").read_text().split(";PART:2")[1].count(";TYPE:Perimeter") for name in ("one", "four")]
-    assert (walls[0], walls[1] > 10) == (0, True)  # an outer wall has a name of its own
+    assert (walls[0], walls[1] > 10) == (0, True)  # an outer wall has a type name of its own
     _run("decompose", "box.stl", "--plan", "box.toml", "--part", "1:infill_density=0.5", "-o", "parts")
     assert "process = {infill_density = 0.5}" in Path("parts/plan.toml").read_text()
     assert "process = {walls = 1}" in Path("parts/plan.toml").read_text()
@@ -158,7 +158,7 @@ def test_planes_that_cannot_be_cut_end_in_one_sentence(
 @pytest.mark.parametrize("laid", [False, True])
 def test_export_by_a_plan_gives_the_g_code_of_the_search_byte_by_byte(folder: Path, laid: bool) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
-    given = [*FAST, *(["--set", "search.seam_mm=100"] if laid else ["--as-is"])]  # too dear to be cut
+    given = [*FAST, *(["--set", "search.seam_mm=100"] if laid else ["--as-is"])]  # a seam too costly to cut
     assert main(["export", "tee.stl", "-o", "searched.gcode", *given]) == 0
     assert main(["decompose", "tee.stl", "--plan", "tee.toml", *given]) == 0
     assert main(["export", "tee.stl", "-o", "planned.gcode", "--plan", "tee.toml", *given]) == 0

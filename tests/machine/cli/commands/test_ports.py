@@ -1,4 +1,4 @@
-"""`tiltprint ports`: every port once, with what answers there, for people and for programs."""
+"""`tiltprint ports`: lists every port once with what answers there, as text and as JSON."""
 
 import json
 from pathlib import Path
@@ -27,7 +27,7 @@ def device(path: str) -> SerialDevice:
 
 @pytest.fixture
 def here(monkeypatch: pytest.MonkeyPatch) -> list[SerialDevice]:
-    """The ports of this computer, as the test fills them in."""
+    """The ports of this computer, filled in by the test."""
     devices: list[SerialDevice] = []
     monkeypatch.setattr(ports_module, "serial_devices", lambda: tuple(devices))
     hear_out(monkeypatch, ports_module)

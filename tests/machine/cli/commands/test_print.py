@@ -1,4 +1,4 @@
-"""`tiltprint print` as a person sees it: screen and keys at a terminal, plain lines elsewhere, the log in the end."""
+"""`tiltprint print` from the user's side: screen and keys at a terminal, plain lines elsewhere, and the log."""
 
 import os
 import re
@@ -22,7 +22,7 @@ OFF = ["M104 S0", "M140 S0"]
 
 @pytest.fixture
 def hours(tmp_path: Path) -> str:
-    """A file of ten hours of careful strokes, each in a place of its own: at 240 times real time nobody sees its end."""
+    """A file of ten hours of separate, slow strokes: even at 240 times real time it does not end during a test."""
     places = [(25 * (k // 250), 0.4 * (k % 250)) for k in range(2000)]
     strokes = [f"G0 X{x} Y{y:.1f}\nG1 X{x + 20} E1.0 F60" for x, y in places]
     file = tmp_path / "hours.gcode"
@@ -52,7 +52,7 @@ def test_a_print_is_watched_paused_resumed_and_cancelled_by_keys(hours: str) -> 
         person.see("tiltprint: the print was cancelled after")
         assert person.end() == 130
     assert "heaters off" in person.seen
-    assert not int(str(while_printing[3])) & 2  # ICANON: keys come as they are pressed
+    assert not int(str(while_printing[3])) & 2  # without ICANON, keys arrive as they are pressed
     assert person.raw.count("\x1b[?25l") == person.raw.count("\x1b[?25h") >= 1
 
 

@@ -1,4 +1,4 @@
-"""`tiltprint profiles detect`: a machine's profile by what its firmware tells, at a port, behind a server or in a file."""
+"""`tiltprint profiles detect`: a machine profile from what its firmware reports at a port, through a server or in a file."""
 
 import json
 from functools import partial
@@ -35,7 +35,7 @@ def detected(out: Path, *words: object) -> Machine:
 
 
 def refusal(capsys: pytest.CaptureFixture[str], out: Path, *words: object) -> str:
-    """The one sentence, nothing having been written."""
+    """The one-sentence refusal; checks that no file was written."""
     capsys.readouterr()
     assert main(["profiles", "detect", *map(str, words), "-o", str(out)]) == 1
     told = capsys.readouterr()
@@ -143,7 +143,7 @@ def test_a_port_that_speaks_grbl_is_asked_its_own_questions(tmp_path: Path) -> N
 
 
 class TellingKlipper(MoonrakerStandIn):
-    """Whose configfile can be asked for."""
+    """A Klipper whose configfile object can be queried."""
 
     def _objects(self, names: dict[str, None]) -> dict[str, Any]:
         axes = {f"stepper_{axis}": {"position_min": -10.0, "position_max": 110.0} for axis in "xyz"}
@@ -153,7 +153,7 @@ class TellingKlipper(MoonrakerStandIn):
 
 
 class TellingDuet(DuetStandIn):
-    """Whose object model has more."""
+    """A Duet with a more complete object model."""
 
     def _model(self, key: str) -> Any:
         drive = {"speed": 6000.0, "acceleration": 700.0, "jerk": 540.0}

@@ -1,4 +1,4 @@
-"""Another slicer's settings as profiles of one's own, held against what that slicer makes of them."""
+"""Import of another slicer's settings as user profiles, compared with the G-code of that slicer."""
 
 import json
 import re

@@ -1,4 +1,4 @@
-"""`tiltprint send` and `print --port SERVER`: what is checked before a byte goes, what is said, what is left behind."""
+"""`tiltprint send` and `print --port SERVER`: checks before anything is sent, messages, and remaining files."""
 
 import signal
 import subprocess
@@ -81,7 +81,7 @@ def test_a_print_that_a_server_is_at_already_is_followed_to_its_end(kind: str, c
         job.start("vase.gcode")
         assert main(["follow", address]) == 0
     output = capsys.readouterr()
-    file = "its file" if kind == "duet" else "vase.gcode"  # a Duet tells no name with its state
+    file = "its file" if kind == "duet" else "vase.gcode"  # a Duet does not report a file name with its state
     assert f"it is printing {file}" in output.err
     assert output.out.startswith(f"printed {file} on {address} in ")
     assert not any(asked.endswith(("upload", "/start")) for asked in job.asked)

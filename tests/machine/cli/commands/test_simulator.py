@@ -1,4 +1,4 @@
-"""`tiltprint simulator` as a person uses it: a path to open, an end with Ctrl-C, sentences for what cannot be."""
+"""`tiltprint simulator` from the user's side: a path to open, an end with Ctrl-C, and refusals."""
 
 import signal
 import subprocess
@@ -19,7 +19,7 @@ from tests.machine.peers import PATIENCE_S
 
 @contextmanager
 def running(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
-    """The command in a process of its own, and what it prints first."""
+    """The command in a process of its own, and the first line that it prints."""
     command = [sys.executable, "-m", "machine.cli.cli", "simulator", *options]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
         assert process.stdout is not None
@@ -30,7 +30,7 @@ def running(*options: str) -> Iterator[tuple[str, subprocess.Popen[str]]]:
 
 
 def ended(process: subprocess.Popen[str], number: signal.Signals = signal.SIGINT) -> tuple[int, str]:
-    """Exit code and the rest of what it prints."""
+    """Exit code and the rest of the output."""
     process.send_signal(number)
     output, _ = process.communicate(timeout=PATIENCE_S)
     return process.returncode, output

@@ -1,4 +1,4 @@
-"""Projects of other slicers on the command line: their marks, their plates and the settings inside."""
+"""Projects of other slicers on the command line: their painted marks, plates and embedded settings."""
 
 import json
 from pathlib import Path
@@ -48,7 +48,7 @@ def test_marks_of_a_project_print_what_the_same_marks_of_a_plan_do() -> None:
 
 
 def test_marks_of_a_project_stay_with_a_model_that_its_plan_lays_down() -> None:
-    """A tee that lies on its side needs no support at its arms: the modifier in them must be where they are then."""
+    """A tee on its side needs no support at its arms: the modifier inside must turn with them."""
     side = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
     standing = prusaslicer(Path("up.3mf"), [Object([Made(TEE), Made(INSERT, "modifier", {"fill_density": "100%"})], [AT_ORIGIN])])
     lying = Placed(np.vstack([side, [0.0, 0.0, 20.0]]))
@@ -87,7 +87,7 @@ def test_a_saved_project_prints_its_plate_and_the_settings_inside_again() -> Non
 
 
 def settings_of(kind: str) -> dict[str, str]:
-    """The part of a project that holds its settings."""
+    """The file in a project that holds its settings."""
     if kind == "PrusaSlicer":
         return {
             "Metadata/Slic3r_PE.config": "; perimeters = 4\n; fill_density = 33%\n; filament_type = PETG\n; temperature = 231\n"
@@ -137,7 +137,7 @@ def test_a_project_is_printed_by_its_own_settings_where_asked(kind: str, capsys:
     export("a.3mf", "--settings-of-file", "--set", "process.infill_density=0.2")
     text = Path("out.gcode").read_text()
     assert "; process.walls = 4\n" in text
-    assert "; process.infill_density = 0.2\n" in text  # what --set says holds over them
+    assert "; process.infill_density = 0.2\n" in text  # --set has priority over the project's settings
     assert "S231" in text
     assert f"a.3mf: uses the settings of {kind} inside: " in capsys.readouterr().err
 

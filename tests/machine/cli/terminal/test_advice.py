@@ -1,4 +1,4 @@
-"""The ways to print a model stand side by side, and the last line names the best."""
+"""The table that compares the ways to print a model; its last line names the best."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""The live screen: what stands on it for a given moment."""
+"""The live screen: its content at a given moment."""
 
 import io
 from dataclasses import replace
@@ -23,7 +23,7 @@ MOMENT = PrintStatus(
 
 
 def lines(progress: PrintStatus, words: tuple[str, ...] = (), hint: str = "", keys: bool = True, width: int = 100) -> list[str]:
-    """The screen as plain lines without the spaces at their ends."""
+    """The screen as plain lines without trailing spaces."""
     console = Console(file=io.StringIO(), record=True, width=width, force_terminal=True, no_color=True)
     at = replace(progress, layers=TIMELINE.layers(progress.part), at=TIMELINE.at(progress.file_line))
     scene = Scene("tree.gcode to /dev/ttyACM0", None)  # type: ignore[arg-type]

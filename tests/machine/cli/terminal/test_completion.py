@@ -1,4 +1,4 @@
-"""What the shell offers while a command is typed."""
+"""Shell completion."""
 
 import os
 import subprocess
@@ -27,7 +27,7 @@ def test_names_of_machines_are_completed():
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_a_script_for_the_shell_is_shown(shell):
     command = [sys.executable, "-m", "machine.cli.cli", "--show-completion", shell]
-    named = os.environ | {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}  # else it is the one that the tests run in, if any
+    named = os.environ | {"_TYPER_COMPLETE_TEST_DISABLE_SHELL_DETECTION": "1"}  # else the shell that runs the tests is detected
     done = subprocess.run(command, env=named, capture_output=True, text=True, timeout=60, check=False)
     assert done.returncode == 0
     assert f"_TILTPRINT_COMPLETE=complete_{shell}" in done.stdout

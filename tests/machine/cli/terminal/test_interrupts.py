@@ -1,4 +1,4 @@
-"""Interrupts: none is lost, whenever it comes."""
+"""Interrupts: none is lost, at whatever moment it arrives."""
 
 import io
 import os
@@ -19,7 +19,7 @@ BUSY_S = 30.0
 
 
 def wait_for_nothing() -> None:
-    """As input() does: nothing comes."""
+    """Wait like input() without any input."""
     never, end = os.pipe()
     try:
         select.select([never], [], [], 30.0)
@@ -29,7 +29,7 @@ def wait_for_nothing() -> None:
 
 
 def test_an_interrupt_that_ends_no_waiting_is_heard_all_the_same() -> None:
-    # Noted in another thread it does not end select() in this one, as a signal just before select() would not.
+    # A signal that arrives in another thread does not end this thread's select(), like one just before select().
     elsewhere = threading.Timer(0.2, lambda: signal.pthread_kill(threading.get_ident(), signal.SIGINT))
     late: list[str] = []
     alarm = threading.Timer(20.0, lambda: late.append("nobody heard it"))
@@ -143,8 +143,8 @@ def test_work_in_native_code_is_ended_with_the_process() -> None:
         process.send_signal(signal.SIGINT)
         assert process.communicate()[1] == "tiltprint: interrupted\n"
     assert process.returncode == 130
-    assert PATIENCE_S < 2.0  # so long a person waits
-    assert time.monotonic() - began_s < BUSY_S  # where the machine has other work too; by itself it would take minutes
+    assert PATIENCE_S < 2.0  # how long a user waits at most
+    assert time.monotonic() - began_s < BUSY_S  # a bound for a busy machine; without the interrupt it would take minutes
 
 
 def test_work_that_ends_by_itself_is_not_ended_again(capfd: pytest.CaptureFixture[str]) -> None:

@@ -1,4 +1,4 @@
-"""Keys of a running print, here or on a server: what each asks for, and a terminal that is as before afterwards."""
+"""Keys during a print, here or on a server: the command of each key, and a terminal that is restored afterwards."""
 
 import os
 import pty
@@ -20,7 +20,7 @@ MOMENT = PrintStatus(elapsed_s=0.0)
 
 
 def asked(*keys: str, state: str = "printing") -> list[PendingCommand]:
-    """What a run of keys asks for."""
+    """The commands that a sequence of keys requests."""
     control = Control()
     board = Keyboard(control)
     board.follow(replace(MOMENT, state=PrintState(state)))
@@ -131,7 +131,7 @@ def test_overrides_stay_inside_what_the_stream_takes() -> None:
 
 
 class Pressed:
-    """Keys as they come in; wait_for() returns once there are enough."""
+    """Keys as they arrive; wait_for() returns once there are enough."""
 
     def __init__(self) -> None:
         self.keys = ""
@@ -150,7 +150,7 @@ class Pressed:
 
 @pytest.fixture
 def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
-    """A terminal as stdin; its other end, where a person's fingers are."""
+    """A terminal as stdin; its other end receives the keys that the test presses."""
     fingers, terminal = pty.openpty()
     with os.fdopen(terminal, "r") as stdin:
         monkeypatch.setattr(sys, "stdin", stdin)
@@ -216,7 +216,7 @@ def test_a_terminal_that_goes_away_ends_the_reading_of_keys_and_is_no_error(monk
 
 
 class Console:
-    """Windows' module msvcrt, with what a person has typed."""
+    """Windows' module msvcrt with typed keys."""
 
     def __init__(self, typed: str) -> None:
         self._typed = list(typed)

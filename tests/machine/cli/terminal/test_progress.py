@@ -1,4 +1,4 @@
-"""Progress of long work: lines in a log, one live line on a terminal."""
+"""Progress of long tasks: lines in a log, one live line at a terminal."""
 
 import threading
 from pathlib import Path

@@ -22,7 +22,7 @@ def part(index: int, mesh: Mesh, base: Plane, pose: Pose, risky_mm2: float = 0.0
 
 
 def tee_in_parts() -> Decomposition:
-    """A tee with its arms cut off sideways, 300 mm² of underside that hang printed straight up; 30 of them stay risky."""
+    """A tee whose arms are cut off sideways: 300 mm² overhang when printed straight up, 30 mm² of them stay risky."""
     right, left = Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0)
     left_arm, rest = cut(solid_of(tee()), left)
     right_arm, stem = cut(rest, right)

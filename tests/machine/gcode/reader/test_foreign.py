@@ -1,4 +1,4 @@
-"""Programs of other slicers and of other hands: read as their firmware would, or refused with the line."""
+"""Programs of other slicers and hand-written ones: read as their firmware would, or refused with the line."""
 
 import re
 import shutil
@@ -32,7 +32,7 @@ def ends(text: str, dialect: str = "marlin", coordinates: str = "table") -> list
 
 
 class TestSlicers:
-    """What a slicer of three axes writes."""
+    """Constructs that slicers for three axes write."""
 
     @pytest.mark.skipif(shutil.which("prusa-slicer") is None, reason="PrusaSlicer is not installed")
     @pytest.mark.parametrize(("flavour", "dialect"), [("marlin2", "marlin"), ("marlin", "klipper"), ("reprapfirmware",) * 2])
@@ -61,7 +61,7 @@ class TestSlicers:
 
 
 class TestFirmwares:
-    """What particular firmwares understand."""
+    """Commands that only particular firmwares understand."""
 
     def test_firmware_retraction_pulls_what_m207_says_and_pushes_it_again(self) -> None:
         parsed = read("M83\nM207 S1.5 F1800\nG1 X1 E2\nG10\nG10\nG0 X5\nG11\nG1 X9 E2")
@@ -153,7 +153,7 @@ SCRAPS = st.sampled_from([*COMMANDS, *WORDS, *SIGNS])
 
 
 def outcome(lines: list[str], machine: Machine) -> tuple[str | None, np.ndarray]:
-    """What is said of lines that are refused, and the numbers of lines that are read; log of the feed, for it must be above 0."""
+    """The refusal, and the numbers read from the lines; the logarithm of the feed, because it must be above 0."""
     try:
         parsed = parse_gcode(lines, machine)
     except GcodeError as error:

@@ -1,4 +1,4 @@
-"""Plain moves read at once are those that the reader takes one by one."""
+"""Plain moves that are read in bulk equal those that the reader parses one by one."""
 
 from dataclasses import fields
 
@@ -33,7 +33,7 @@ OTHERS = st.sampled_from(
 
 
 def in_turn(lines: list[str]) -> list[str]:
-    """The same lines, none of which is plain: comments do not begin their lines, commands have one."""
+    """The lines in a form that is not plain: with trailing comments and command words."""
     return [f" {line}" if line.startswith(";") else f"{line} ;" for line in lines]
 
 

@@ -1,4 +1,4 @@
-"""Rows share their places where they can, and there is room for all of them."""
+"""The table of rows shares start and end positions where it can, and has capacity for every row."""
 
 import numpy as np
 

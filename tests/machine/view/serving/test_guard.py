@@ -1,4 +1,4 @@
-"""Who the workbench answers: its own pages by the secret address, and nobody else."""
+"""Access to the workbench: its own pages at the secret address are answered, all other requests are refused."""
 
 import pytest
 
@@ -15,7 +15,7 @@ def status(
     path: str = "/secret/",
     port: int = PORT,
 ) -> int:
-    """What is answered, 200 where the request is let through."""
+    """Status of the answer, 200 where the request is accepted."""
     headers = [(name, value.encode()) for name, value in ((b"host", host), (b"Origin", origin)) if value is not None]
     refused = refusal(headers, method, path, TOKEN, port)
     return 200 if refused is None else refused[0]

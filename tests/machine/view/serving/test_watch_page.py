@@ -1,4 +1,4 @@
-"""A running print on a page: who is answered, what is told, and that it ends with the print."""
+"""The page of a running print: access control, its values, and its end with the print."""
 
 import http.client
 import json
@@ -44,7 +44,7 @@ def port_of(watched: Watched) -> int:
 
 
 def asked(watched: Watched, path: str, method: str = "GET", **headers: str) -> tuple[HTTPResponse, bytes]:
-    """What the server answers to a path below the address that was told."""
+    """The server's answer to a path below the secret address."""
     return asked_without_token(watched, f"/{watched.token}{path}", method, **headers)
 
 
@@ -58,7 +58,7 @@ def asked_without_token(watched: Watched, path: str, method: str = "GET", **head
 
 
 def ordered(watched: Watched, name: str, method: str = "POST", **headers: str) -> int:
-    """The status of what a page of the print's own asks for."""
+    """Status of a request from the print's own page."""
     own = {"Origin": f"http://127.0.0.1:{port_of(watched)}"}
     return asked(watched, f"/order/{name}", method, **own | headers)[0].status
 
