@@ -22,10 +22,10 @@ export function update(changes) {
   }
 }
 
-/** Call listener(store, the previous store) now and after every change. */
+/** Call listener(store, the previous store) after every change, from the first state. */
 export const subscribe = (listener) => listeners.push(listener);
 
-/** Call changed(value picked from the state) now and whenever the value differs from the last one. */
+/** Call changed(value picked from the state) for the first state and whenever the value differs from the last one. */
 export function onNew(pick, changed) {
   let told = "";
   onState((state) => {

@@ -32,7 +32,7 @@ export async function takeFiles(files) {
 
 let uploaded = Promise.resolve(); // resolves when the last file has been sent: one at a time, so that bar and Cancel belong to one file
 
-/** Send a file to a bench, with progress and a Cancel button. Resolves when the server has answered; errors arrive by the connection. how: more of the query. */
+/** Send a file to a bench, with progress and a Cancel button. Resolves when the server has answered; errors arrive by the connection. how: further parts of its address. */
 const sendFile = (file, how = {}, to = "") => new Promise((answered) => {
   uploaded = uploaded.catch(() => {}).then(() => new Promise((sent) => upload(file, how, to, sent, answered)));
 });

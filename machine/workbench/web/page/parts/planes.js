@@ -27,7 +27,7 @@ const planeNow = () => planesNow()[store.part - 2] || null;
 
 export const isLocked = (part = store.part) => store.state.locked[part - 2];
 
-/** The figures of the planes that are shown, slightly older while one is dragged; null: unknown. */
+/** The figures of the planes that are shown, the last accepted ones while one is dragged; null: unknown. */
 export const figuresNow = () => {
   const { figures, hand, state } = store;
   return hand ? hand.allowed.figures : figures && alikeBut(figures.cuts, state.cuts) ? figures : null;
@@ -93,7 +93,7 @@ function leavePlane() {
 export const removePart = (part) => send({ do: "remove", part });
 export const lockPart = (part, locked) => send({ do: "lock", part, locked });
 
-/** Move the part in the print order, if possible. */
+/** Print the part at another position in the order, if possible. */
 export const reorderPart = (part, to) => Math.min(part, to) > 1 && to <= store.state.parts && ask({ do: "reorder", part, to }, (refusal) => { if (!refusal) choosePart(to); });
 
 /** Restrict the selected part to the piece above its plane at a point in the build plate's frame; null: everything above. */

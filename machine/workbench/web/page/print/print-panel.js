@@ -57,7 +57,7 @@ export function printFrame(camera, picture) {
   };
 }
 
-/** The page of the print follows in the picture's place while the bench shows the printed model; the returned function is called with all new states. */
+/** While the bench or the open G-code file is what is printed, the page of the print can follow in the picture's place; the returned function is called with all new states. */
 function followIn(print) {
   let follows = false, shown = 0;
   const isOf = (what) => Boolean(print()?.key) && print().key === store.state?.[what]?.key, same = () => isOf("sliced") || isOf("gcode");
@@ -178,7 +178,7 @@ export function printPanel() {
 
   function show(before) {
     const known = before.prints.map((job) => job.number), fresh = state.prints.findLast((job) => !known.includes(job.number));
-    if (fresh && chosen && (fresh.holder === OWN_PAGE || !running().includes(print()))) chosen = fresh.number; // the stop button at hand remains that of its print
+    if (fresh && chosen && (fresh.holder === OWN_PAGE || !running().includes(print()))) chosen = fresh.number; // otherwise the stop button keeps its print
     else if (!print()) chosen = (running().at(-1) || state.prints.at(-1) || { number: 0 }).number;
     const lost = state.prints.find((job) => mine.has(job.number) && job.holder !== OWN_PAGE);
     if (lost) notice(`Another page has taken control of the print of ${lost.name}.`, "taken");

@@ -17,7 +17,7 @@ export function hear(prints) {
   }
 }
 
-/** A warning that a running print has not been reported for a while: it or the connection may hang; "" if it has. */
+/** A warning that a running print has not been reported for a while: it or the connection may hang; "" otherwise. */
 export function silence({ number, is_over: over, live }) {
   const past = performance.now() - (HEARD.get(number)?.at ?? Infinity);
   return !over && live && past > SILENT_MS ? `nothing heard of it for ${Math.floor(past / 1000)} s` : "";

@@ -41,7 +41,7 @@ export function gripOf(element, { take, hold, put, drop, step }) {
   }, { passive: false });
 }
 
-const LEAST_PIXELS = 0.5; // pixels for each mm along a direction: seen head on, a handle would jump
+const LEAST_PIXELS = 0.5; // smallest size of a mm along a direction: seen head on, a handle would jump
 
 /** later(event): mm that the pointer has moved along a direction since it grabbed a point; null where that cannot be seen. */
 export function alongWay(picture, place, way, event) {

@@ -110,7 +110,7 @@ const stem = (word) => (/^[a-z]{3,}s$/.test(word) ? word.slice(0, -1) : word); /
 const textsOf = ({ key, label, title, synonyms, meaning, about }) => [`${label} ${key}`, synonyms, `${title} ${meaning} ${about}`].map((text) => text.toLowerCase());
 const hasWords = (setting, words) => words.every((word) => textsOf(setting).join(" ").includes(word));
 
-/** Rank of a match: 0 where the label is exactly these words, 1 where it or the key contains one. */
+/** Rank of a match: 0 where the label is exactly these words, 1 where it or the key contains one, higher for the other texts. */
 function farFrom(setting, words) {
   if (!words.length || setting.label.toLowerCase().split(/\s+/).map(stem).join(" ") === words.join(" ")) return 0;
   return 1 + textsOf(setting).findIndex((text) => words.some((word) => text.includes(word)));

@@ -103,7 +103,7 @@ export function comparePanel() {
 }
 
 const PIECE = 7; // numbers for each straight piece: two ends and its height
-const BROAD = 1.1; // half the width of a bead, in heights of it
+const BROAD = 1.1; // half the width of a bead, as a multiple of its height
 
 /** Triangles {places, colours} of a part's walls, from the server's bytes: an upright band along each piece, and a level one as wide as a bead, so that slopes have no gaps. */
 function bandsOf(bytes, colour) {
@@ -142,7 +142,7 @@ export function wallsOf(picture) {
   });
 }
 
-/** Disabled commands state the reason. */
+/** The Save menu; entries that are not available yet state the reason. */
 export function saveMenu() {
   const confirm = () => {
     const { errors } = store.state.sliced;
