@@ -141,7 +141,7 @@ export function putAt(element, place) {
   if (place) element.style.transform = `translate(${place[0]}px, ${place[1]}px)`;
 }
 
-/** Colour swatches with texts, for a list with room for them. */
+/** Swatches of colours with texts, at most the first 24. */
 export const swatches = (entries) => entries.slice(0, 24).map(([colour, text]) => made("span", {}, swatch(colour), text));
 
 /** Arrow keys, {key: step}, move the focus along a row or a column of elements; reached(element) is called first. */

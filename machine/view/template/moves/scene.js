@@ -42,7 +42,7 @@ export function sceneOf(print, bells) {
   scene.choosePart = (index) => {
     scene.part = index;
     scene.low = 0;
-    scene.go(Math.max(scene.row, scene.layers().at(-1)?.last ?? 0)); // the whole layer is printed
+    scene.go(Math.max(scene.row, scene.layers().at(-1)?.last ?? 0)); // the whole part is printed
     bells.ring("layers");
   };
   /** Set the highest layer drawn: the print is shown at its end. */

@@ -32,7 +32,7 @@ function lineOf(row, idle, choose) {
   return line;
 }
 
-/** Notes on the displayed row. */
+/** Why a row was chosen, or the command that chooses it. */
 function showChoice(row, drawn) {
   const told = !row ? ["Cut by a plan: none of these rows."] : row.chosen ? [`✓ chosen ${row.why}.`]
     : [drawn ? "This is how it would be cut; " : "It was not made; ", made("code", { text: row.command }), " takes it, and ", made("code", { text: "--parts", className: "whole" }), " goes with every other command too."];

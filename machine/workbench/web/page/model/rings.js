@@ -11,8 +11,8 @@ import { store, update } from "../store.js";
 const RING_AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
 const RING_STEPS = 96, RING_REACH = 1.05; // RING_REACH: share of the farthest vertex's distance from the middle
 const RING_KEY_DEG = 1, RING_SNAP_DEG = 15; // the latter while Shift is held
-const FINE_STEPS = 720; // steps of a drag around a ring
-const BEHIND_PIXELS = 3; // distance by which the near side of a ring must be behind its middle before the other side is used
+const FINE_STEPS = 720; // points around a ring, from which the one under the pointer is taken
+const BEHIND_PIXELS = 3; // added to the distance of points on a ring's far side, so that the pointer prefers its near side
 
 export function ringsOf(picture) {
   const svg = $("rings"), groups = [...svg.querySelectorAll("[data-ring]")], on = () => $("show-rings").getAttribute("aria-pressed") === "true";
