@@ -12,7 +12,7 @@ from mdp.pose import Pose
 from mdp.zone import UNMARKED, Marked, Modifier
 from profiles.errors import UserError
 
-VOLUME_TOLERANCE = 1e-6  # of the model's: 200 random cuts lost at most 4e-16 of it, while a lost sliver is larger
+VOLUME_TOLERANCE = 1e-6  # share of the model's volume: 200 random cuts lost at most 4e-16 of it; a lost sliver is larger
 ORDER_TOLERANCE_MM = 1e-4  # 200 random cuts left corners 5e-14 mm off their planes; no print shows 0.1 µm
 
 

@@ -20,9 +20,9 @@ from mdp.sweep.bending import AREA, X, Y, greatest_stress_per_moment, section_mo
 from profiles.profile import Profile
 
 BESIDE_MM = 0.02  # from a base plane, where sections are taken: in the plane itself they would be those of a face
-# of the square of a model's diameter: the convex hull of a cut through a neck or the root of a limb is smaller
+# share of a model's diameter squared: the convex hull of a cut through a neck or the root of a limb is smaller
 BULK = 0.15
-FIRST = 0.15  # of the volume: a smaller first part is a sliver, not a base for all the parts on it
+FIRST = 0.15  # share of the volume: a smaller first part is a sliver, not a base for all the parts on it
 TOUCHING_MM2 = 0.01  # sections with less common area meet only in an edge
 
 

@@ -110,7 +110,7 @@ class Mesh:
         lengths = np.einsum("fki,fki->fk", edges, edges)
         share = np.clip(-np.einsum("fki,fki->fk", corners, edges) / np.where(lengths > 0.0, lengths, 1.0), 0.0, 1.0)
         least = np.linalg.norm(corners + share[..., None] * edges, axis=2).min(axis=1)
-        sides = np.einsum("fki,fki->fk", np.cross(corners, edges), self.normals[:, None])  # of the point's projection on the face
+        sides = np.einsum("fki,fki->fk", np.cross(corners, edges), self.normals[:, None])  # side of the point's projection
         height = np.abs(np.einsum("fi,fi->f", corners[:, 0], self.normals))
         distance = np.where((sides >= 0.0).all(axis=1), height, least)
         distance[self.areas_mm2 == 0.0] = np.inf

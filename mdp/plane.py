@@ -11,7 +11,7 @@ from profiles.errors import PlanError
 from profiles.frozen import Vector
 
 UP = np.array([0.0, 0.0, 1.0])
-LEAST_LENGTH, MOST_LENGTH = 1e-6, 1e6  # of a vector that is meant as a direction
+LEAST_LENGTH, MOST_LENGTH = 1e-6, 1e6  # limits for the length of a vector that is meant as a direction
 UNIT = 1e-12  # a vector whose squared length is this close to 1 keeps its bits, so that a plan repeats exactly the same planes
 
 

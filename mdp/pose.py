@@ -21,7 +21,7 @@ from profiles.machine import Machine
 
 SINGULAR = 1e-7  # sine of an angle below any table's resolution; the turn is undefined nearer to the singular pose
 KNOWN = 256  # cached rotations
-DECIMALS = 9  # of an angle as a file or a user states it: accurate to a tenth of a micrometre over a metre
+DECIMALS = 9  # digits of an angle as a file or a user states it: accurate to a tenth of a micrometre over a metre
 LEVEL = 1.0 - 1e-12  # sine of the turn about y above which the turns about x and z are about the same axis
 Three = list[float]  # a vector; numpy's operations on a single one take longer than the rest of a pose
 

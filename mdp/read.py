@@ -30,7 +30,7 @@ INCH_MM, METRE_MM = 25.4, 1000.0
 TYPICAL_MM = 100.0  # among several fitting units, the one that brings the model nearest to this size is proposed
 MANY_FACES = 500_000  # more do not improve a print: with edges of 0.2 mm they cover an area of 90 cm2
 PREDICATE = re.compile(r"(is|has|encloses|cannot) ")  # begins errors of repair
-MOST_BYTES = 2**30  # of a file: twenty million facets of a binary STL
+MOST_BYTES = 2**30  # greatest size of a file: twenty million facets of a binary STL
 
 
 class SizeError(MeshError):

@@ -43,7 +43,7 @@ _GLTF = 0.001 * np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0,
 
 FOLDER_FILES = ("decomposition.3mf", "decomposition.json", "plan.toml", "decomposition.glb")  # beside the parts in a folder
 PART_FILES = "part-[0-9][0-9]*.stl"  # glob pattern of the names from part_file
-HEADING = b"tiltprint part"  # of the STL files that stl() returns
+HEADING = b"tiltprint part"  # heading of the STL files that stl() returns
 
 
 def part_file(index: int) -> str:

@@ -31,7 +31,7 @@ ROUNDING_MM = 1e-6  # a plane may touch a zone that it must not pass through
 # resolution for comparing points; shifted, since coordinates lie on whole and half micrometres
 GRID_MM, GRID_SHIFT = 1e-4, 0.3141
 FACE_NUMBERS = re.compile(r"\d{1,9}(-\d{1,9})?( \d{1,9}(-\d{1,9})?)*")
-MOST_PRODUCTS = 4_000_000  # of directions and points that are processed at a time
+MOST_PRODUCTS = 4_000_000  # pairs of a direction and a point that are processed at a time
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ else:
 
 LEAST_LEAN_DEG = 1.0  # a table that tilts less can print only upright parts
 UPRIGHT = 0.9995  # least cosine between the turn axis and the vertical
-GCODE = "gcode"  # of a text in the schema: lines of G-code
+GCODE = "gcode"  # kind of a text in the schema: lines of G-code
 STEADY_S = 10.0  # how long a nozzle must hold its temperature before firmware continues
 Block = Annotated[str, WithJsonSchema({"type": "string", "format": GCODE})]
 Pixels = Annotated[int, Field(ge=16, le=1024)]

@@ -17,7 +17,7 @@ WIDTHS = (
     "support_line_width_mm",
 )
 
-MOST_SHARE = 0.9  # of a line's width: a higher bead does not stick
+MOST_SHARE = 0.9  # share of a line's width: a higher bead does not stick
 ROUGHEST = 2.0  # line widths by which a fuzzy wall may be moved
 
 

@@ -17,8 +17,8 @@ WALLS = (Kind.OUTER_WALL, Kind.INNER_WALL, Kind.OVERHANG)
 OUTSIDE = -1000  # ranks up to this are not part of an island of the section: skirt, brim, support
 BEFORE_WALLS = -500  # beads of this rank come before the walls of their island; walls have higher ranks
 FILL, LAST = 1, 99  # beads between these ranks fill the area inside the walls, in any order; ironing comes last
-ROUND_SIDES = 1.0 - pi / 4.0  # of height squared: a square less the two half circles in it, as in PrusaSlicer's Flow
-# of the line width, one and a half nozzles: a thin bead of this width stays under the flat of the tip
+ROUND_SIDES = 1.0 - pi / 4.0  # share of height squared: a square less the two half circles in it, as in PrusaSlicer's Flow
+# factor on the line width, one and a half nozzles: a thin bead of this width stays under the flat of the tip
 INTERFACE_WIDTH = 4.0 / 3.0
 EVEN_MM = 0.03  # widths that differ by less are equal
 # line directions that share the density; for curves: cells

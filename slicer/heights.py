@@ -20,11 +20,11 @@ from profiles.messages import key_name
 from profiles.process import Process
 from profiles.profile import Profile
 
-LEAST_SHARE = 0.25  # of a neighbour's height: thinner layers print unevenly
+LEAST_SHARE = 0.25  # share of a neighbour's height: thinner layers print unevenly
 SHELL_KEYS = ("top_layers", "top_thickness_mm", "bottom_layers", "bottom_thickness_mm")
 SAME_MM = 1e-5  # heights that differ less are equal: STL files round to this, 200 mm up
 LEVEL = 1e-9  # tolerance on the cosine between two equal directions
-BIN_SHARE = 0.125  # of the least layer height: height of the bins in which slopes are recorded, by their worst face
+BIN_SHARE = 0.125  # share of the least layer height: height of the bins in which slopes are recorded, by their worst face
 FLAT = 0.9998  # cosine of one degree: flatter faces count as level
 LEAST_LEVEL_MM2 = 1.0  # a layer need not end at a smaller level face
 MOST_BINS = 2_000_000  # 16 MB; a part 300 mm high has 24,000 at a least layer height of 0.1 mm

@@ -23,7 +23,7 @@ from slicer.strokes.speed import first_layer_speeds, layer_of, rising_fan, timed
 from slicer.support.beads import beads_around, support_beads
 from slicer.support.support import Supports
 
-THICK = 0.75  # of the nozzle: layers that are not visible are as high as prints well, as in PrusaSlicer
+THICK = 0.75  # share of the nozzle: layers that are not visible are as high as prints well, as in PrusaSlicer
 
 
 def lift_mm(profile: Profile) -> float:

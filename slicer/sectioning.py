@@ -59,7 +59,7 @@ from slicer.walls.skeleton import FEATURE
 
 ABOVE_MM = 1e-3  # off the height of a pedestal, at which level faces lie
 BESIDE_MM = 1.0  # within this distance of a limb the head moves above its base plane
-THICKNESS_MARGIN_MM = 0.04  # of a piece only this much thicker than the thinnest, lines may not cover the whole length
+THICKNESS_MARGIN_MM = 0.04  # in a piece only this much thicker than the thinnest, lines may not cover the whole length
 RIM_MM = 0.04  # overlap by which the projections of faces in neighbouring layers unite
 
 

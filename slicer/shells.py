@@ -60,7 +60,7 @@ FEWEST_LAYERS = 60  # number of layers from which several processes compute them
 # Loops and walls of varying width, inner walls that end on a cut, and the contours of the area inside the walls, of its narrow
 # parts and, if different, of the area inside the uncut model's walls: Polygons cannot be sent between processes.
 Contours: TypeAlias = tuple[tuple[tuple[Floats, ...], ...], tuple[Wall, ...], tuple[Bead, ...], list[list[Floats]]]
-REACH = 0.1  # of the line width: overlap of an inner wall that ends on the wall along a cut
+REACH = 0.1  # share of the line width: overlap of an inner wall that ends on the wall along a cut
 TOUCHING_MM2 = 1e-3  # a section that gains less from its neighbours has none
 NEAR_MM = 3.0  # width of the solid shell of a limb's cut face beside its base
 THREADS_APART_MM = 0.05  # between the threads of a thick bridge, as in PrusaSlicer (BRIDGE_EXTRA_SPACING)

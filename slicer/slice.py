@@ -46,9 +46,9 @@ from slicer.support.support import Supports, explain, own_supports
 from slicer.walls.walls import fuzzy_walls
 
 FEWEST_IN_ALL = 250  # layers; fewer are sliced faster than processes can be forked and their paths returned
-LARGEST_SHARE = 0.6  # of all layers: if a part has more of them, the other parts end long before it
+LARGEST_SHARE = 0.6  # share of all layers: if a part has more of them, the other parts end long before it
 PIN_RANK = OUTSIDE - 1  # pins come before everything else in a layer
-PIN_CHORDS = 12  # of the circle that the tip describes at a pin
+PIN_CHORDS = 12  # chords of the circle that the tip describes at a pin
 # cross-section of a pin's stroke, in squares of the nozzle diameter: Klipper refuses 4 (max_extrude_cross_section)
 PIN_MOST_AREA = 3.0
 

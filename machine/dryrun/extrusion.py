@@ -24,9 +24,9 @@ FILE_LEAST, FILE_MOST = 0.7, 1.4  # the file's plastic over that of its own widt
 ROW_LEAST, ROW_MOST, ROW_MM = 0.4, 2.0, 1.0
 ODD_MM = 8.0  # length of odd beads in a part that is reported
 LAYER_MM = 20.0
-CLIMBING = 0.3  # of a layer's height
+CLIMBING = 0.3  # share of a layer's height
 SPARE_MM3 = 0.5
-FAST = 0.95  # of the travels' usual speed
+FAST = 0.95  # share of the travels' usual speed
 FASTER = 1.3  # than all but a few strokes
 FEW = 0.03
 

@@ -19,13 +19,13 @@ from mdp.mesh import Floats, Indices
 from slicer.paths import ON_PLATE_MM, Kind
 
 LOOSE = (Kind.OVERHANG.value, Kind.BRIDGE.value, Kind.IRONING.value, Kind.PURGE.value, Kind.SKIRT.value, *SUPPORT)
-SLACK_MM, SLACK_SHARE = 0.02, 0.1  # of a layer's height
+SLACK_MM, SLACK_SHARE = 0.02, 0.1  # tolerance on a layer's height, mm and as a share of it
 STAND_OFF_MM = 0.5  # greatest distance between a part and the support below it
 FARTHEST_SUPPORT_MM = 2.0  # from a bridge above it, the most that process.support_gap_mm allows
 NEW_OBJECT_MM = 1.0  # a larger fall begins another object beside the first one
-FLOATING_SHARE = 0.5  # of a layer's length
+FLOATING_SHARE = 0.5  # share of a layer's length
 LEAST_MM = 10.0
-SEEN_SHARE = 0.6  # of a layer's height: the replay sees a larger gap as air
+SEEN_SHARE = 0.6  # share of a layer's height: the replay sees a larger gap as air
 CRUMB_MM = 1.0  # a shorter layer is the tip of something too fine to print
 
 

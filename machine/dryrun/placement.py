@@ -17,12 +17,12 @@ from slicer.paths import Kind
 HANGING = (Kind.OVERHANG.value, Kind.BRIDGE.value)  # declared as hanging by the slicer
 IRONING = Kind.IRONING.value  # passes over existing plastic
 PURGE = Kind.PURGE.value  # a start block's purge beside the plate is meant to fall
-ERROR_SHARE, WARNING_SHARE = 0.05, 0.01  # of a part's length in air
-LOST_SHARE = 0.5  # of a part's first layer without anything below it
-OVERLAPPING_SHARE = 0.4  # of a layer's length
+ERROR_SHARE, WARNING_SHARE = 0.05, 0.01  # shares of a part's length that are in air
+LOST_SHARE = 0.5  # share of a part's first layer without anything below it
+OVERLAPPING_SHARE = 0.4  # share of a layer's length
 LEAST_MM = 10.0
-STRETCH_MM = 30.0  # of consecutive beads in air
-HANGING_SHARE = 0.8  # of a move's length
+STRETCH_MM = 30.0  # length of consecutive beads in air
+HANGING_SHARE = 0.8  # share of a move's length
 ROUNDING_MM = 0.02
 
 

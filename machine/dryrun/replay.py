@@ -24,14 +24,14 @@ from profiles.profile import Profile
 
 STEP_MM = 0.5
 EVEN = 1e-6
-ROUGH = 0.5  # of half a bead: height by which earlier plastic may appear too high from another direction
-INNER = 0.35  # of the bead's width: where support below it is sought
+ROUGH = 0.5  # share of half a bead: height by which earlier plastic may appear too high from another direction
+INNER = 0.35  # share of the bead's width: where support below it is sought
 OWN = 3.0  # widths back along its path within which plastic is the bead's own beginning
-FEW_TURNS = 16  # of the table; with more, segments are kept in memory, 48 bytes per bead
+FEW_TURNS = 16  # turns of the table; with more, segments are kept in memory, 48 bytes per bead
 FARTHEST = 3.0  # heights below a bead, besides half its width and a gap, beyond which plastic surely does not carry it (_under)
 ROTATE = int(MoveKind.ROTATE)
 MOST_TURNED = 100_000_000  # segments rotated into the frames of all runs together
-FREE_END = 0.5  # of a span: reach of a bead that is held at one end only
+FREE_END = 0.5  # share of a span: reach of a bead that is held at one end only
 
 
 class Contacts(NamedTuple):

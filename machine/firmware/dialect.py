@@ -98,11 +98,11 @@ class Dialect:
     statements: frozenset[str] = frozenset()  # words in capitals that begin lines other than commands
     bare_words: bool = True  # accepts words without a number, G28 X Y, and an E that no command uses
     lacks: frozenset[str] = frozenset()  # codes in other firmwares' start blocks at which it ends the program
-    value_word: str = "S"  # of temperatures and fans
+    value_word: str = "S"  # letter of the value in commands for temperatures and fans
     stands: tuple[str, ...] = ()  # after a restart: sets the axes to {x_mm} {y_mm} {z_mm} {tilt_deg} {turn_deg}
     serial: bool = True  # accepts numbered lines with checksums over a serial line and answers ok
     homed_before: bool = False  # runs no program before its axes are homed by hand; G28 has another meaning
-    endstop_word: str = ""  # of G1: with 1, 3 or 4 the move ends at an end stop
+    endstop_word: str = ""  # letter in G1: with 1, 3 or 4 the move ends at an end stop
     # displays {text} and waits; the user may jog the tip meanwhile if the firmware can
     wait_for_person: tuple[str, ...] = ("M0 {text}",)
     commands: Mapping[str, Command] = field(default_factory=dict)  # its rows besides those of machine.gcode.commands

@@ -20,14 +20,14 @@ SLOWEST_BAUD, FASTEST_BAUD = 1200, 4_000_000  # limits of known adapters
 LAST_NUMBER = 99_900
 NUMBER_DIGITS = len(str(LAST_NUMBER))
 FRAME_BYTES = len("N *123\n")  # the most that the sender adds to a command, without the digits of its number
-FRAME_CHARACTERS = FRAME_BYTES - len("\n") + NUMBER_DIGITS  # of the characters that a firmware keeps
+FRAME_CHARACTERS = FRAME_BYTES - len("\n") + NUMBER_DIGITS  # the frame's share of the characters that a firmware keeps
 
 
 @dataclass(frozen=True)
 class SimulatedSettings:
     """Settings of a simulated printer, per s and s²."""
 
-    letters: str  # of X Y Z and the rotary axes, the filament last
+    letters: str  # letters of X Y Z and the rotary axes, the filament last
     limits: Sequence[tuple[float, float]]  # mm or deg, without the filament
     steps: Sequence[float]  # per mm or degree, without the filament
     speeds: Sequence[float]

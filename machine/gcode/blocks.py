@@ -24,7 +24,7 @@ RESUME, BEFORE_LAYER = "resume", "before_layer"
 MOST_QUOTED = 3
 OTHER_WORD = {"S": "P", "P": "S"}  # the word of a temperature in the other kind of firmware
 WITH_E = {"G76", "M66", "M67", "M68"}  # commands of CNC programs with an E word
-EXPRESSION = frozenset("#[<%")  # of CNC programs, which are not parsed here
+EXPRESSION = frozenset("#[<%")  # characters of CNC programs, which are not parsed here
 PLACEHOLDER = re.compile(r"\{(\w+)\}")
 
 

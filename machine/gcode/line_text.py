@@ -47,7 +47,7 @@ LETTERS = {
 }  # fmt: skip
 
 # Comments that begin layers and parts, without the sign and surrounding blanks; every reader uses these.
-LAYER = re.compile(r"LAYER_CHANGE|LAYER:-?[0-9]{1,6}")  # of PrusaSlicer and tiltprint, and of Cura
+LAYER = re.compile(r"LAYER_CHANGE|LAYER:-?[0-9]{1,6}")  # comments of PrusaSlicer and tiltprint, and of Cura
 PART = re.compile(r"PART: *([0-9]{1,6})(?: of ([0-9]{1,6}))?.*")
 
 

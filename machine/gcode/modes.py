@@ -63,7 +63,7 @@ class Modes:
     relative: bool = False
     filament_relative: bool = False  # set by M82 and M83, and by G90 and G91 in some firmwares
     inverse_time: bool = False
-    offset: list[float] = field(default_factory=lambda: [0.0] * 6)  # of G92: program's coordinate minus position
+    offset: list[float] = field(default_factory=lambda: [0.0] * 6)  # offset set by G92: program's coordinate minus position
     units: list[float] = field(default_factory=lambda: [1.0] * 6)  # mm or deg of one unit of a word
     steps: list[bool] = field(default_factory=lambda: [False] * 6)  # whether a word is relative
 

@@ -42,12 +42,12 @@ EVERY_S = 0.1  # which is at most this old if anything has happened since
 SYNC_S = 1.0  # between syncs; after a restart of the computer the disk is older by this and the time of an fsync
 BLOCK_BYTES = 4096  # a disk writes a block completely or damages only that block
 SLOTS = 3  # one on its way to the disk, one being written, one safe
-LONGEST_BYTES = 1_000_000  # of the heading, which holds the resolved profile
+LONGEST_BYTES = 1_000_000  # longest heading, which holds the resolved profile
 BEYOND_MM = 1e9  # and deg: beyond any machine's positions and any filament's length
 PRIVATE = 0o600  # prints are private to the user
-BOOT_ID = Path("/proc/sys/kernel/random/boot_id")  # of Linux
+BOOT_ID = Path("/proc/sys/kernel/random/boot_id")  # Linux only
 MARK = b"!"
-MEMORY = Path("/dev/shm")  # of Linux: writable when no disk is, and kept until the computer restarts
+MEMORY = Path("/dev/shm")  # Linux's memory file system: writable when no disk is, and kept until the computer restarts
 BINARY = getattr(os, "O_BINARY", 0)  # Windows would write carriage returns otherwise
 
 
@@ -72,7 +72,7 @@ class Checkpoint:
     # X Y Z tilt turn E after the acknowledged line, unwrapped, or of a tip that has left the print; None: unknown.
     pose: tuple[float | None, ...] = ()
     state: PrintState = PrintState.PRINTING
-    z_offset_mm: float = 0.0  # of the user, as sent to the firmware
+    z_offset_mm: float = 0.0  # offset set by the user, as sent to the firmware
     shifts_z: bool = True  # whether the firmware can change it
     continued_in: str | None = None  # the journal of the run that resumed the print
 

@@ -95,7 +95,7 @@ class PrintStatus:
     part: int | None = None
     parts: int | None = None
     layer: int | None = None
-    layers: int | None = None  # of the part
+    layers: int | None = None  # number of layers in the part
     file_line: int = 0  # line of the newest acknowledged command in the program's file, from 1
     file: str = ""  # printed by a print server,
     bytes_read: int | None = None  # and how far it was read

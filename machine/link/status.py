@@ -28,7 +28,7 @@ SEVERAL = 3  # matching coordinates other than 0: a restarted printer reports 0 
 class PrinterStatus:
     """A printer's own report; None: not reported."""
 
-    last_number: int | None = None  # of the last accepted line
+    last_number: int | None = None  # number of the last accepted line
     position: dict[str, float] | None = None
     temperature: Temperature = field(default_factory=Temperature)
     greeted: bool = False  # the firmware sent its start-up message: it has just restarted

@@ -26,7 +26,7 @@ JUDGE, SEARCH, PROGRAM, DRY_RUN, PICTURES = (
     ("draw",),
 )
 LOOK_S = 0.2
-TRIM_THRESHOLD, MMAP_THRESHOLD, LARGE_BYTES = -1, -3, 1 << 20  # of mallopt in glibc's malloc.h
+TRIM_THRESHOLD, MMAP_THRESHOLD, LARGE_BYTES = -1, -3, 1 << 20  # options of mallopt in glibc's malloc.h
 COMPILE = "machine.pipeline.precompile:compile_bundle"
 
 

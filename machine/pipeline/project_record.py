@@ -14,7 +14,7 @@ from profiles.places import KINDS
 from profiles.wording import LONGEST_VALUE, sentences
 
 VERSION = 2
-VERSION_OF_ONE_MODEL = 1  # of a project without other models, which older versions of this program can read
+VERSION_OF_ONE_MODEL = 1  # version for a project without other models, which older versions of this program can read
 RECORD = "work.json"
 LONGEST_NAME = 255  # bytes of a file name on any disk
 

@@ -18,7 +18,7 @@ GCODE_SUFFIXES = {".gcode", ".gco", ".g", ".nc", ".ngc"}
 SIMULATED = "sim"  # the port of the simulated printer
 BAUD = 115200
 UPLOAD_MIB = 256  # the largest upload from a page: five million facets of a binary STL
-MOST_COPIES = 1000  # of a model, and models on a plate
+MOST_COPIES = 1000  # copies of a model, and models on a plate
 FORCE_GOES_ON = phrase("force", "--force continues")  # ending of a forcible error's message
 
 

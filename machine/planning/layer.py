@@ -41,7 +41,7 @@ NO_ENDS = np.zeros(0, dtype=np.int64)
 STEP_MM = 0.5  # between sample points of paths and beads, and size of the cells of which only the highest point counts
 MOST_COASTED = 0.25  # greatest fraction of a path for coasting
 RUN_MM = 20.0  # length of a stroke over which the filament of a turn is spread
-MOST_FULL = 1.5  # of a bead's nominal filament: filament that did not ooze must not fill the space twice
+MOST_FULL = 1.5  # factor on a bead's nominal filament: filament that did not ooze must not fill the space twice
 SEEN = (Kind.OUTER_WALL, Kind.OVERHANG, Kind.TOP_SKIN)
 
 

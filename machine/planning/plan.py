@@ -23,7 +23,7 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 from slicer.paths import NUMBER, Kind, Layer, Path, SlicedPart
 
-PURGE_WIDTH = 2.0  # of the purge line, in nozzle widths: a thick bead fills the nozzle soon and peels off in one piece
+PURGE_WIDTH = 2.0  # width of the purge line, in nozzle widths: a thick bead fills the nozzle soon and peels off in one piece
 EDGE_MM, GAP_MM = 1.0, 3.0  # distance to the plate's edge and to prints near the plate
 LOW_MM = 2.0  # prints higher above the plate pass over the line
 MOST_LANES, SHORTEST_MM = 4, 10.0

@@ -28,7 +28,7 @@ ADDRESS = re.compile(r"(?:([^:/?#]*)://)?(\[[^\]/?#]*\]|[^:/?#]*)(:[^/?#]*)?(/[^
 # Paths may contain colons, such as /dev/serial/by-path; any other name with a colon is an unknown kind of line, thus a mistake.
 DEVICE = re.compile(rf"(?:(?i:{'|'.join(LINES)})://|[^:]*[/\\]).*|[^:]+")
 NUMBER = re.compile(r":0*[1-9]\d{0,4}", re.ASCII)
-LABEL = re.compile(r"[\w-]{1,63}")  # of a host name, in any script
+LABEL = re.compile(r"[\w-]{1,63}")  # one label of a host name, in any script
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ KEPT = 10  # logs of each kind
 LIMIT_BYTES = 64_000_000  # per log: about 600,000 lines with their answers
 PIECES = 4  # the first is kept, the others are the newest
 WORDS_KEPT = 50  # messages of a printer
-LONGEST_BYTES = 4096  # of an unfinished line
+LONGEST_BYTES = 4096  # longest unfinished line
 UNWRITTEN_S = 1.0  # at most this much is lost in a crash: writing each chunk at once would cost as much as sending it
 
 

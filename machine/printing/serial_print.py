@@ -35,7 +35,7 @@ HEATERS = {
     False: "the printer did not confirm that its heaters are off: look at it",
     None: "nothing had been sent yet",
 }
-Begin = Callable[[PrinterStatus], ResumePoint]  # of a resumed print: decides where it continues, given the printer's status
+Begin = Callable[[PrinterStatus], ResumePoint]  # begins a resumed print: decides where it continues, given the printer's status
 
 
 class SerialPrinter:

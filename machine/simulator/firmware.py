@@ -20,7 +20,7 @@ from profiles.machine import Machine
 
 BUSY_S = 2.0  # Marlin's HOST_KEEPALIVE interval
 UNREAD_LINES = 20
-CHATTER_S = 3600.0  # of a longer wait only the last hour is reported: a jump over years must not fill the memory
+CHATTER_S = 3600.0  # only the last hour of a longer wait is reported: a jump over years must not fill the memory
 IDLE_S = 1.0  # interval of `wait` with Marlin's NO_TIMEOUTS
 MACHINE_STATE = {True: "S_XYZ:5", False: "S_XYZ:3"}  # Marlin's M_RUNNING and M_IDLE
 
@@ -55,7 +55,7 @@ class SimulatedFirmware:
         self._waits = False  # the program itself waits for the current command
         self._taken = self._watched = 0
         self.watch: Callable[[int], bool] | None = None
-        self._reason = ""  # of a stop
+        self._reason = ""  # reason for a stop
         self.dead = False
 
     def receive(self, data: bytes) -> None:

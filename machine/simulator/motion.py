@@ -19,7 +19,7 @@ SLACK = 1e-6  # tolerance of limits for coordinates with few decimals
 SLIP_MM = 0.4  # and deg: a motor without current is moved by hand or weight, and catches at another step
 HARD_MM = 2.0  # from a soft limit to the axis's hard stop
 ARC_MM, CIRCLE_CHORDS = 1.0, 72  # Marlin's MAX_ARC_SEGMENT_MM and MIN_CIRCLE_SEGMENTS
-SEGMENTS_PER_S = 200.0  # of a turn that the firmware follows
+SEGMENTS_PER_S = 200.0  # segments in a turn that the firmware follows
 STEPS = (80.0, 80.0, 400.0, 80.0, 80.0)  # per mm or degree, for M114's Count
 
 WordValues = Mapping[str, float]  # by letter

@@ -27,7 +27,7 @@ class Record:
     duration_s: Floats  # (n,)
     first: int  # number of earlier moves that were not kept
     moves: int  # number of all moves,
-    strokes: int  # of all strokes,
+    strokes: int  # number of all strokes,
     pushed_mm: float  # filament of the strokes,
     moving_s: float  # time of all moves
     events: tuple[tuple[float, str], ...]  # (virtual s, what)

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from machine.view.encoding import Column, whole
 
-MOST_LETTERS = 1_000_000  # of all patterns together; with more the page would grow by several hundred kilobytes
+MOST_LETTERS = 1_000_000  # letters in all patterns together; with more the page would grow by several hundred kilobytes
 AXES, FILAMENT = "XYZ", "EUVW"
 AXIS_DIGITS, FILAMENT_DIGITS = 3, 5  # digits after the point, as the page's rows are stored
 # Holes: the full number; without trailing zeros; without the zero before the point.

@@ -149,7 +149,7 @@ def connected(workers: Workers) -> Iterator[Pool]:
         executor.shutdown(cancel_futures=True)
 
 
-_on_worker = Isolation()  # of all threads of a dask worker process
+_on_worker = Isolation()  # shared by all threads of a dask worker process
 
 
 def call_on_worker(*call: Any) -> Any:

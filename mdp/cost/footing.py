@@ -24,9 +24,9 @@ from mdp.topology.edges import opposites
 from profiles.profile import Profile
 
 PUSH_N = 1.0  # sideways push of the nozzle at the top of a print: light contact with a curled edge
-ADHESION_MPA = 0.2  # of plastic to a clean warm plate, a fraction of what published peel tests of PLA and PETG give
+ADHESION_MPA = 0.2  # adhesion of plastic to a clean warm plate, a fraction of what published peel tests of PLA and PETG give
 NEWTON_PER_G = 9.81e-3
-BRIM_SEGMENTS = 32  # of a full turn around a corner
+BRIM_SEGMENTS = 32  # segments in a full turn around a corner
 # Height above the plate, as a share of the diameter, at which the base of a rounded end is measured: brim and support fill the
 # gap below it.
 BLUNT = 0.01

@@ -31,9 +31,9 @@ from mdp.sweep.facets import Blemishes, FaceTable, times_along
 from mdp.sweep.limbs import cylinders_cut, limb_reach
 from mdp.sweep.sweep import Remainder
 
-LEAST_SINE = 0.01  # of the angle between face and plane; a chord along a face parallel to the plane has no definite length
+LEAST_SINE = 0.01  # sine of the angle between face and plane; a chord along a face parallel to the plane has no definite length
 NEEDED, RIM, COSINE, VOLUME, COLUMNS = range(5)  # columns of the sums over a part; NEEDED in mm2, RIM in mm
-LEAST_EDGE_MM = 1e-3  # of the line in which two cuts meet; a shorter sum over fans is rounding
+LEAST_EDGE_MM = 1e-3  # length of the line in which two cuts meet; a shorter sum over fans is rounding
 Vector = tuple[float, float, float]
 
 

@@ -25,10 +25,10 @@ RAYS = 12
 REACH = 0.3  # length of a ray that meets nothing, as a share of the model's diagonal
 OPEN = 0.1  # share of the rays that may be blocked at a face that still counts as open
 MOST_NEIGHBOURS = 512  # faces of a neighbourhood; a finer mesh gets a smaller radius
-LIFT = 1e-6  # of a ray's start above its face, as a share of the model's diagonal
+LIFT = 1e-6  # distance of a ray's start above its face, as a share of the model's diagonal
 FINE = 20_000  # faces; a finer mesh is measured on a simplified copy
 COARSER = 1e-3  # deviation of that copy from the surface, as a share of the model's diagonal
-WORTH = 0.7  # of the faces; a copy with more saves too little
+WORTH = 0.7  # share of the faces; a copy with more saves too little
 ALIKE = 0.5  # least cosine between the normals of a face and its counterpart on the copy
 
 

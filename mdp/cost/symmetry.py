@@ -18,7 +18,7 @@ from mdp.plane import Plane
 UPRIGHT = 0.02  # greatest z of a mirror plane's normal: only vertical planes are useful above a table
 ODD = 0.02  # odd moments of a model that may be symmetric, as shares of the even moments of the same order
 SAMPLES, TRIED = 10000, 2000  # points on the surface, and how many of them are compared with the mirror image
-CELL = 0.012  # of the diagonal: tolerance between a surface and its mirror image
+CELL = 0.012  # share of the diagonal: tolerance between a surface and its mirror image
 ALIKE_SHARE = 0.97  # share of the surface that has a mirror image
 DIRECTIONS = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.5**0.5, 0.5**0.5, 0.0], [0.5**0.5, -(0.5**0.5), 0.0]])
 OFF_DEG = 15.0  # a plane that leans less across a mirror plane is meant to be square to it

@@ -12,7 +12,7 @@ import numpy as np
 
 from mdp.mesh import Floats, Mesh
 
-LEAST_SHARE = 0.02  # of the surface with one normal: on a ball of 5,000 faces no two faces reach it together
+LEAST_SHARE = 0.02  # share of the surface with one normal: on a ball of 5,000 faces no two faces reach it together
 MOST_FLATS, MOST_DIRECTIONS = 12, 40  # 12 flats have 66 pairwise lines; few of those lie in more than two flats
 SAME = cos(radians(0.5))
 # cell size in the coordinates of a unit vector, in which areas are summed beforehand: several times what SAME allows

@@ -29,12 +29,12 @@ LEAN_DEG = 5.0  # a model rests if it can be leaned by this much before it tips 
 SAME_FACET_DEG = 0.5
 LYING_DEG = 15.0  # a model that leans less lies on a side
 SPREAD = 1000
-SAME_MOMENT = 0.02  # of the largest second moment: axes whose moments differ by less are indistinguishable
+SAME_MOMENT = 0.02  # share of the largest second moment: axes whose moments differ by less are indistinguishable
 MOST_FACETS = 1000
 MOST_CORNERS = 1000
 EQUAL_MM2 = 1e-6  # smaller differences of area are rounding
 HIGHEST = 6  # order of the highest moment that is measured
-PLAIN = 1e-3  # of the greatest possible moment: smaller values are rounding or a symmetry
+PLAIN = 1e-3  # share of the greatest possible moment: smaller values are rounding or a symmetry
 SIDES = np.stack([np.cos(np.arange(64) * pi / 32), np.sin(np.arange(64) * pi / 32)])
 
 

@@ -15,15 +15,15 @@ from mdp.directions.unit_vectors import frame_across
 from mdp.mesh import Floats, Ints, Mesh
 from mdp.overhang import Mask
 
-OFF = sin(radians(4.0))  # of the angle between a face and the motion: a thread climbs by 3 degrees
-CAP = cos(radians(4.0))  # of the angle between a face's normal and the axis: level faces fit every rotation
+OFF = sin(radians(4.0))  # sine of the angle between a face and the motion: a thread climbs by 3 degrees
+CAP = cos(radians(4.0))  # cosine of the angle between a face's normal and the axis: level faces fit every rotation
 LEAST_SHARE = 0.5  # share of the surface, caps excluded, that is turned about the axis
 MOSTLY = 0.8  # that share in a model that is hardly anything else
 LEAST_SIDE = 0.15  # least share of the whole surface: less is the edge of a plate
-ROUNDS = 12  # of least squares
+ROUNDS = 12  # iterations of least squares
 SECTORS, MOST_SECTORS, LEAST_SECTOR = 12, 10, 0.01  # around the axis; required sectors with faces, each with a share of the area
-BESIDE_HANDLES = 0.95  # of the area: the ends of handles and arms face away from the axis, too
-SAME = cos(radians(10.0))  # of the angle between axes that count as equal
+BESIDE_HANDLES = 0.95  # share of the area: the ends of handles and arms face away from the axis, too
+SAME = cos(radians(10.0))  # cosine of the angle between axes that count as equal
 LEVEL_DEG = 5.0  # tolerance of an axis: the fit to half a shell is some 2 degrees off
 
 

@@ -38,7 +38,7 @@ PAINTED = {PAINT_SUPPORT: "support", PAINT_NO_SUPPORT: "no_support", PAINT_NO_SE
 SAME = 1e-6  # cosine of a right angle, and share of a box's volume that a solid inside may lack
 PLURAL = {"is": "are", "changes": "change"}
 MOST_NAMED = 8  # settings named in a sentence
-THINNEST_MM = 0.001  # of a height range: a smaller difference is rounding of its file
+THINNEST_MM = 0.001  # least size of a height range: a smaller difference is rounding of its file
 BESIDE_MM = 1.0  # margin around an object, more than its outlines can reach beyond its mesh
 
 
@@ -54,7 +54,7 @@ class Marks:
         self._corners_mm = mesh.vertices[mesh.faces]
         self._path, (self._scale, self._turn, self._shift_mm), self._on_plate = path, moved, build.on_plate
         self._notes: list[str] = []
-        self._subjects: dict[tuple[str, str], list[str]] = {}  # of notes, by predicate
+        self._subjects: dict[tuple[str, str], list[str]] = {}  # subjects of notes, by predicate
 
     @cached_property
     def _settings(self) -> "SlicerSettings | None":

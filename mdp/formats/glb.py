@@ -19,7 +19,7 @@ from profiles.errors import MeshError
 
 MAGIC, JSON_CHUNK, BINARY_CHUNK = 0x46546C67, 0x4E4F534A, 0x004E4942  # "glTF", "JSON" and "BIN" read as little-endian numbers
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
-TYPES = {1: "SCALAR", 3: "VEC3"}  # of accessors, by the number of values in a row
+TYPES = {1: "SCALAR", 3: "VEC3"}  # types of accessors, by the number of values in a row
 LINES_TO, TRIANGLES = 3, 4  # modes of primitives: up to 3 they are points and lines
 UNNAMED = frozenset({"SOLID", "SHELL", "COMPOUND", "COMPSOLID", "FACE"})  # OpenCASCADE's names for unnamed shapes
 DEEPEST = 64  # nesting of nodes

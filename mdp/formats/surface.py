@@ -13,7 +13,7 @@ from profiles.errors import MeshError
 
 # Limits of what a file may place by reference: a small file whose references double at every level would exceed any memory.
 MOST_PLACED = 20_000  # objects, components and nodes
-MOST_PLACED_MESHES = 2_000  # of them, which are united where they touch
+MOST_PLACED_MESHES = 2_000  # greatest number of placed meshes, which are united where they touch
 MOST_PLACED_FACES = 20_000_000  # as many as the largest STL file holds (mdp.read.MOST_BYTES)
 
 

@@ -23,7 +23,7 @@ from mdp.kernels import threads
 from mdp.kernels.workers import frame, read_frames
 
 LOOK_S = 0.2  # interval of checks for the parent
-MOST_RUNS = 2048  # of tasks; a pipe of one page holds their numbers, and no system has smaller pages
+MOST_RUNS = 2048  # greatest number of tasks; a pipe of one page holds their numbers, and no system has smaller pages
 NUMBER = 2  # bytes of a run's number in the pipe
 AHEAD = 64  # runs of results that are received before they are needed
 ROOM = 1 << 20  # bytes that a copy can answer before they are read, where the system allows it

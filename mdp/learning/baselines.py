@@ -16,7 +16,7 @@ from mdp.mesh import Floats
 if TYPE_CHECKING:
     from xgboost import DMatrix
 
-WEIGHTS = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 53)])  # of M6 against M2; all are tried
+WEIGHTS = np.concatenate([[0.0], np.geomspace(0.05, 20.0, 53)])  # weights of M6 relative to M2; all are tried
 FITTED_AT = 5  # cutoff of the NDCG for fitting the trade-off and for early stopping of tuned trees
 # XGBoost's own ranking demo, which the paper cites, with the paper's depth and rounds, and pairs as in 2020.
 PAPER = {"max_depth": 8, "eta": 0.1, "gamma": 1.0, "min_child_weight": 0.1, "tree_method": "hist", "nthread": 1, "seed": 0}

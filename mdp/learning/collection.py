@@ -23,7 +23,7 @@ LOCK = "index.lock"
 NO_RISK, NO_CUT, NO_SIDE, FAILED = "no risky face", "nothing feasible", "no further side to rest on", "failed: "
 STAYS = (NO_RISK, NO_CUT, NO_SIDE)  # reasons that hold however often the search is repeated
 HEADS = ("terms", "settings", "searches", "models", "records", "lists", "mean length", "mean J", "core h", "late")
-MOST_NAMES = 20  # of failed searches: about a screen
+MOST_NAMES = 20  # greatest number of failed searches that are named: about a screen
 
 
 Key = tuple[str, int, str]  # a model, the number of its orientation, and the terms of the search

@@ -35,7 +35,7 @@ TIE = 1e-9  # outcomes (shares) that differ less are equal
 SMALLEST_RANGE = 1e-8  # added to the range, which is 0 if all values of a list are equal
 LEAST_OUTCOME = 0.05  # lower outcomes count as this one, otherwise the best models would weigh most
 COLUMNS_NEEDED = ("id", "source_repo", "source_path")
-TRAIN_SHARE, VALIDATION_SHARE = 0.60, 0.15  # of the sources, as in the 2020 paper; the rest tests
+TRAIN_SHARE, VALIDATION_SHARE = 0.60, 0.15  # shares of the sources, as in the 2020 paper; the rest tests
 FOLDS = 4  # splits with disjoint test sets, which together hold every model
 
 Singles = NDArray[np.float32]

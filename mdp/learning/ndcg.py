@@ -12,7 +12,7 @@ from mdp.learning.lists import RatedList
 from mdp.mesh import Floats, Ints
 from mdp.ranking.ranker import DECIMALS
 
-RESAMPLES = 2000  # of a bootstrap: 50 of them lie beyond either end of the 95 % interval
+RESAMPLES = 2000  # samples of a bootstrap: 50 of them lie beyond either end of the 95 % interval
 
 Scores = Callable[[RatedList], Floats]
 Measure = Callable[[Floats, RatedList], float]

@@ -21,7 +21,7 @@ from profiles.errors import UserError
 from profiles.files import SHARED, write_whole
 
 OPSET, IR_VERSION = 13, 8  # old enough for every onnxruntime of recent years
-TRADE_OFFS = (1.0, 4.0, 16.0)  # of M6 against M2
+TRADE_OFFS = (1.0, 4.0, 16.0)  # weights of M6 relative to M2
 LEAST_RANGE = 1e-4  # added to a feature's range: a difference of 1e-4 of the model is insignificant
 SMALLEST_SPREAD = 1e-6  # inputs with a smaller standard deviation count as constant
 

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 Sides = tuple[Sequence[RatedList], Sequence[RatedList]]  # for training and for validation
 MOST_NETWORKS = 12  # in an ensemble; with --loss regret its file stays below 200 kB
 LOSSES = {"urank": "paper", "regret": "cheap"}  # and the default columns of each
-OWN = ("epochs", "patience", "batch", "rate")  # of the schedule; each loss has its own defaults
+OWN = ("epochs", "patience", "batch", "rate")  # settings of the schedule; each loss has its own defaults
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 CLASSIC, LEARNED = "classic", "learned"
 INPUT, OUTPUT = "features", "scores"
-DECIMALS = 4  # of scores; networks are accurate to some 7 digits, and scores that differ less keep the given order
+DECIMALS = 4  # digits of scores; networks are accurate to some 7, and scores that differ less keep the given order
 RANKED_TOGETHER = 50  # candidates, the B of the 2020 paper
 
 

@@ -19,7 +19,7 @@ from mdp.plane import PLATFORM, Plane
 from mdp.ranking.features import COLUMNS, features
 from mdp.ranking.ranking import Model, RankedCandidate
 
-VERSION = 2  # of the arrays; version 1 had only the six metrics of the paper
+VERSION = 2  # version of the arrays; version 1 had only the six metrics of the paper
 NO_NODE = -1
 FIRST_DATE = (1980, 1, 1, 0, 0, 0)  # the earliest date of a zip file; the clock would change the bytes
 

@@ -8,14 +8,14 @@ from mdp.formats.surface import Surface, concatenate
 from mdp.mesh import NO_COLOUR, Floats, Indices
 
 NONE = -1  # no triangle; as an index it selects the last row of a table, which holds the default
-NEAR_SHARE = 1e-4  # of the model's size: the greatest shift of a vertex by a repair
+NEAR_SHARE = 1e-4  # share of the model's size: the greatest shift of a vertex by a repair
 SAME_DIRECTION = 1.0 - 1e-6  # cosine of two normals
 INSIDE = -1e-6  # least barycentric coordinate
 # Cell sizes of a plane's normal and its distance from the middle, in sizes of the model. Normals of about one direction differ by
 # 1.5e-3, and so do the distances: the margin, in cells, by which a triangle extends beyond its own plane.
 PLANE_CELLS, PLANE_MARGIN = np.array([0.05, 0.05, 0.05, 0.005]), np.array([0.04, 0.04, 0.04, 0.4])
 FINEST = 8  # halvings of the model's size: limit for cells of position
-PAIRS_AT_ONCE = 1_000_000  # of points and triangles, which take some 100 MB of memory
+PAIRS_AT_ONCE = 1_000_000  # pairs of a point and a triangle, which take some 100 MB of memory
 
 
 def carry_colours(surfaces: list[Surface], solid: Surface) -> Indices | None:

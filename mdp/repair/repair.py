@@ -33,16 +33,16 @@ from profiles.errors import MeshError, counted
 if TYPE_CHECKING:
     import manifold3d as m3
 
-WELD_SHARES = (1e-6, 1e-5, 1e-4)  # of the model's size: first the rounding of ASCII files, last gaps of 0.01 mm in 100 mm
-SHRINK = 0.01  # of the model's size: how much a repair may reduce its box
+WELD_SHARES = (1e-6, 1e-5, 1e-4)  # shares of the model's size: first the rounding of ASCII files, last gaps of 0.01 mm in 100 mm
+SHRINK = 0.01  # share of the model's size: how much a repair may reduce its box
 SAME_VOLUME = 1e-5  # share by which two readings of one surface may differ: float32 files move corners by 6e-8 of the size
-MOST_CHANGED = 0.01  # of the volume: how much the reading of edges with many faces may change it
+MOST_CHANGED = 0.01  # share of the volume: how much the reading of edges with many faces may change it
 MOST_READINGS = 5  # each pairs the edges again; the last reading of an unstable surface is used
 SECTIONS = 23  # an overlap missed by all of them is lower than a 24th of the height
-EXCESS = 1e-3  # of the area of all sections; smaller folds are left alone, since repairing them would re-triangulate the model
+EXCESS = 1e-3  # share of the area of all sections; smaller folds stay, since their repair would re-triangulate the model
 DEEPEST, TOGETHER = 5, 8  # depth of halvings, and number of pieces united at once
 UNION_FACES, UNION_GROWTH = 1000, 2  # faces that a union may have, and limit per face of its pieces
-SHARED = 0.5  # of the volume: a body that counts half of itself twice cannot be resolved
+SHARED = 0.5  # share of the volume: a body that counts half of itself twice cannot be resolved
 
 
 def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:

@@ -8,7 +8,7 @@ from mdp.repair.weld import drop_unused_vertices
 from mdp.topology.components import connected_components
 from mdp.topology.edges import Edges, Flags, edges_of
 
-LOOSE_SHARE = 0.2  # of the area; a larger loose patch may be the model itself
+LOOSE_SHARE = 0.2  # share of the area; a larger loose patch may be the model itself
 MOST_LOOSE = 300  # patches removed; a surface with more of them is not a solid with a small defect
 
 

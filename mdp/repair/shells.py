@@ -16,11 +16,11 @@ from profiles.errors import MeshError
 if TYPE_CHECKING:
     import manifold3d as m3
 
-NEGLIGIBLE = 1e-7  # of the volume of all shells: 0.1 mm across beside a 20 mm cube
+NEGLIGIBLE = 1e-7  # share of the volume of all shells: 0.1 mm across beside a 20 mm cube
 FLAT_SHEETS = "its faces lie in one plane or on each other; give it a thickness (Blender: Solidify)"
-FLAT = 1e-9  # of the cube of a shell's diagonal
+FLAT = 1e-9  # share of the cube of a shell's diagonal
 MOST_BODIES = 2000  # each costs time in every step: 20 s of export for this number of cubes of 1 mm
-GRID = 0.1  # of the reach: grid for corners of bodies that are united, finer than the rounding of files
+GRID = 0.1  # share of the reach: grid for corners of bodies that are united, finer than the rounding of files
 SAMPLES = 24  # vertices of a shell that must lie inside another for it to count as contained
 
 

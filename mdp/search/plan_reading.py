@@ -27,7 +27,7 @@ MESH_ZONES = ("no_support", "support")  # kinds that may also be a mesh
 MODIFIER_KEYS = (*BOX_KEYS, "z_mm", "mesh", "process")
 ROW_KEYS = ("planes", *ROW_FIGURES)
 MOST_BYTES = 10_000_000  # far more than the workbench writes; a larger file is refused unread
-MOST_ZONES = 1000  # of a kind; every face is tested against each
+MOST_ZONES = 1000  # greatest number of each kind; every face is tested against each
 MODIFIER_VOLUMES = {"a box": set(BOX_KEYS), "a height range z_mm": {"z_mm"}, "a mesh": {"mesh"}}
 MOST_MODIFIERS = 100  # each adds a pass over the layers
 

@@ -35,8 +35,8 @@ ENOUGH = 1e-3  # a move that saves a smaller share of the risky area is not wort
 SAME_MM2 = 1e-6
 # two planes this close to each other's mirror image are meant to be symmetric
 PARTNER_COSINE, PARTNER_MM = cos(radians(20.0)), 5.0
-NECK_REACH = 0.06  # of the model's diameter: search range for necks around a plane
-TRADE_OFF = 4.0  # of further cuts, as in the beam's second slot
+NECK_REACH = 0.06  # share of the model's diameter: search range for necks around a plane
+TRADE_OFF = 4.0  # trade-off for further cuts, as in the beam's second slot
 
 
 def polish(problem: Problem, node: Node) -> Node:
@@ -173,7 +173,7 @@ def _local_search(problem: Problem, surface: Forecast, last: Node, position: int
     cut.
     """
     here, *later = last.planes[position:]
-    classes = surface.classes([here, *later])  # of the present direction; a plane that is taken is measured by its own classes
+    classes = surface.classes([here, *later])  # classes of the present direction; a taken plane is measured by its own classes
     reach = surface.reach([here, *later])
     least_mm2 = surface.left_mm2([here, *later], classes, reach)
     pivots = _pivots(_cut_face(last.path[position + 1]))

@@ -41,7 +41,7 @@ from profiles.machine import Machine
 from profiles.profile import Profile
 
 SIZE_MM = 100.0  # size of the model for which a seam counts as wide as search.seam_mm
-FINEST = 1 / 32  # of the offset step; a grid through a plane nearer to the origin would have too many planes
+FINEST = 1 / 32  # share of the offset step; a grid through a plane nearer to the origin would have too many planes
 
 
 class Problem:

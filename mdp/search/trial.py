@@ -33,7 +33,7 @@ from profiles.frozen import Vector
 from profiles.profile import Profile
 
 MOST_TRIED = 16  # feasible positions of a plane, by the sweep, that are tried
-# of the model's height along the plane's normal: distance from rejected positions to the next one that is tried;
+# share of the model's height along the plane's normal: distance from rejected positions to the next one that is tried;
 APART_SHARE = 0.01
 # once a position is feasible, those skipped before it are searched by bisection
 MOST_PLACES = 20  # points marked on an obstacle
@@ -93,9 +93,9 @@ class Trials:
         self._problem = problem = Problem(lifted, with_search(profile, hidden_seam_share=1.0), zones)
         self._node = root = problem.root  # after the cuts of the last trial
         self._surface = Forecast.of(root.remainder, problem.terms, root.seam_weights)
-        self._keys: list[Key] = []  # of the planes of these cuts, as they were given
+        self._keys: list[Key] = []  # keys of the planes of these cuts, as they were given
         self._aside: frozenset[Key] = frozenset()
-        self.uncut_support_mm2 = self._surface.parts([])[1]  # of the model in one piece
+        self.uncut_support_mm2 = self._surface.parts([])[1]  # support of the model in one piece
 
     def set_aside(self, planes: Sequence[Plane]) -> None:
         """Set infeasible planes that further trials cut without a check, so that the planes after them are tried all the same."""

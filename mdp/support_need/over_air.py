@@ -13,7 +13,7 @@ from mdp.mesh import Floats, Ints
 from mdp.support_need.patches import Classes
 from mdp.topology.edges import LinkedFaces
 
-CELLS = 96  # of a grid along its longer side
+CELLS = 96  # number of grid cells along its longer side
 LEAST_COSINE = 0.05  # between an upward-facing surface and the direction
 RASTER = 0.5  # cells between two samples of a flat region
 ASIDE = 0.29  # offset of the samples within the raster's step, so that none lies on the edge of a cell

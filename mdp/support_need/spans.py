@@ -16,7 +16,7 @@ from mdp.mesh import Floats, Ints
 
 TURNS = 8  # directions tried over half a turn, besides those of the patch's sides: the search tests thousands of patches
 BINS = 36  # bins for the directions of the sides, over half a turn
-BESIDE = 0.37  # of a bin: position of direction 0 in the first one, so that common angles lie at no end of a bin
+BESIDE = 0.37  # share of a bin: position of direction 0 in the first one, so that common angles lie at no end of a bin
 LINES = 24  # greatest number of lines over a patch, otherwise one per line width
 MOST_LOOSE = 0.2  # greatest share of loose line ends
 TOLERATED = 0.02  # greatest share of the lines' length with a loose end, as at corners of a patch

@@ -24,7 +24,7 @@ from mdp.sweep.facets import Blemishes, Indices, Layout, class_along
 
 THIRD = 1.0 / 3.0
 COT_30 = 3.0**0.5
-FEATHER_COSINE = cos(radians(20.0))  # of face and plane: the edge between them is thin enough to be reported
+FEATHER_COSINE = cos(radians(20.0))  # cosine between face and plane: the edge between them is thin enough to be reported
 ROUNDING_MM = 1e-9  # a corner created by a cut lies in its plane
 BLOCK = 128  # faces that are processed together, so that their data stays in the cache
 AHEAD = 3  # columns of a face that are computed without testing whether it crosses them: avoids mispredicted branches
@@ -103,7 +103,7 @@ class Rim(NamedTuple):
         return self.feathered_mm / self.length_mm if self.length_mm > 0.0 else 0.0
 
 
-NO_RIM = Rim(0.0, 0.0, 0.0)  # of a part on the build plate
+NO_RIM = Rim(0.0, 0.0, 0.0)  # rim of a part on the build plate
 
 
 def measure_rim(mesh: Mesh, weights: Floats, plane: Plane, feather: float) -> Rim:

@@ -29,14 +29,14 @@ PARALLEL = cos(radians(1.0))
 SAME_RADIUS = 1.25  # greatest ratio of two radii given by edges of one strip: strips differ in width by at most a quarter
 LEAST_ASKEW = 0.05  # sine of some 3 degrees
 TOUCHED_MM = 0.05  # a plane that cuts no further into a cylinder leaves it intact
-MOST_FACES = 200  # of a strip; a strip cut by other bores has several, a wall or a plate many
+MOST_FACES = 200  # greatest number of faces in a strip; a strip cut by other bores has several, a wall or a plate many
 TURNED_MM2 = 500.0  # area of a turned body that counts like a bore when it is cut askew; larger ones count more
-SMOOTH = cos(radians(20.0))  # of the folds between the pieces of a bent pipe, and beside a band of a round surface
-SHORT = 0.15  # of the radius: a hole in a thin sheet is shorter, too, but its rims are sharp
+SMOOTH = cos(radians(20.0))  # cosine of the folds between the pieces of a bent pipe, and beside a band of a round surface
+SHORT = 0.15  # share of the radius: a hole in a thin sheet is shorter, too, but its rims are sharp
 FEWEST = 4  # edges between strips: fewer are a chamfer, or a fillet of three facets
-OFF_CIRCLE = 0.02  # of the radius: the corners of a cylinder lie on it up to the rounding of a file
+OFF_CIRCLE = 0.02  # share of the radius: the corners of a cylinder lie on it up to the rounding of a file
 LEAST_TURN_DEG = 100.0  # covered by the strips: a quarter turn is a rounded edge, which needs no fit
-LEAST_RADIUS_MM, MOST_BORE_MM, MOST_PIN_MM = 0.7, 25.0, 6.0  # of screws, bearings, pegs; larger ones are the model's shape
+LEAST_RADIUS_MM, MOST_BORE_MM, MOST_PIN_MM = 0.7, 25.0, 6.0  # sizes of screws, bearings, pegs; larger ones are the model's shape
 
 
 @dataclass(frozen=True, eq=False)

@@ -21,7 +21,7 @@ from mdp.sweep.rays import TriangleTree, triangle_tree
 # altitude of a triangle, as a share of the largest coordinate, below which rounding may decide which corner is higher
 LEAST_ALTITUDE = 1e-8
 COSINE_MARGIN = 1e-6
-GRID_BITS = 16  # of the cells of the space-filling curve along each axis
+GRID_BITS = 16  # bits for the cells of the space-filling curve along each axis
 UNKNOWN = -2  # anchor of a vertex that has not been computed
 
 Indices = NDArray[np.uint32]

@@ -16,7 +16,7 @@ from mdp.mesh import Floats, Indices, Ints, Mesh
 from mdp.topology.components import connected_components
 
 Flags = NDArray[np.bool_]
-FLAT_COSINE = 1.0 - 1e-9  # of the normals of neighbours in one flat region: some 0.003 degrees
+FLAT_COSINE = 1.0 - 1e-9  # cosine between the normals of neighbours in one flat region: some 0.003 degrees
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from math import pi
 
 from profiles.foreign.config import OF_NOZZLE, Config
 
-AUTO_WIDTH, AUTO_NARROW = 1.125, 1.0  # of the nozzle: walls and infill; top skins and support
-ROUND_ENDS = 1.0 - pi / 4.0  # of a bead's height: overlap of adjacent beads
+AUTO_WIDTH, AUTO_NARROW = 1.125, 1.0  # share of the nozzle: walls and infill; top skins and support
+ROUND_ENDS = 1.0 - pi / 4.0  # share of a bead's height: overlap of adjacent beads
 
 # A value of ours and how it was computed, "" if unchanged; or None and the reason why nothing is imported.
 Converted = tuple[float | bool | str | None, str]

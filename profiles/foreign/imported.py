@@ -14,7 +14,7 @@ from profiles.profile import load_one
 from profiles.toml_text import read_value, value_text
 
 PROCESS_BASE = "standard"
-NOZZLE_MM = 0.4  # of the shipped machines; the machine profile decides in the end
+NOZZLE_MM = 0.4  # nozzle of the shipped machines; the machine profile decides in the end
 KINDS = ("process", "material")
 RULES = {"process": PROCESS_RULES, "material": MATERIAL_RULES}
 CONDITIONS = {  # read together with other settings, and reported with them

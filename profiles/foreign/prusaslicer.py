@@ -14,7 +14,7 @@ from typing import Any
 from profiles.errors import ProfileError
 from profiles.foreign.config import Config, finite, first_filament, width_of_nozzle
 
-KINDS = {"print": "process", "filament": "material", "printer": "printer"}  # of the sections of a bundle, and the options' names
+KINDS = {"print": "process", "filament": "material", "printer": "printer"}  # section of a bundle -> name of its option
 SECTION = re.compile(r"\[(.+)\]")
 # SuperSlicer also gives line widths by their distance; its percentages of widths and layers refer to the nozzle, and flows are
 # percentages (supermerill/SuperSlicer, src/libslic3r/PrintConfig.cpp, ratio_over).

@@ -12,12 +12,12 @@ from profiles.foreign import cura, orcaslicer, prusaslicer
 from profiles.foreign.config import Config
 from profiles.foreign.imported import settings_of_place
 
-MOST_BYTES = 256 << 20  # of a G-code file; settings are in its last MiB, OrcaSlicer's also in its first
+MOST_BYTES = 256 << 20  # greatest size of a G-code file; settings are in its last MiB, OrcaSlicer's also in its first
 END_BYTES = 1 << 20
 ORCA_KEYS = frozenset({"sparse_infill_density", "wall_loops", "nozzle_temperature"})
 PRUSA_KEYS = frozenset({"fill_density", "perimeters", "temperature", "layer_height", "filament_diameter", "nozzle_diameter"})
 DAMAGED: tuple[type[Exception], ...] = (*DAMAGED_ZIP, ProfileError)
-MOST_SETTINGS_BYTES = 16 << 20  # of a slicer file, whose settings have some 100 kB
+MOST_SETTINGS_BYTES = 16 << 20  # greatest size of a slicer file, whose settings have some 100 kB
 OF_PRUSASLICER = ("metadata/slic3r_pe.config", "metadata/slic3r.config", "metadata/superslicer.config")
 OF_ORCASLICER = "metadata/project_settings.config"
 OBJECTS_OF_ORCASLICER = "metadata/model_settings.config"  # present without the other if a file holds only models

@@ -26,7 +26,7 @@ from profiles.foreign.conversion import (
 Rule = tuple[str, str, Convert]  # our key, "" if there is none; PrusaSlicer's; the conversion
 FIRMWARE = "the firmware's own"
 AUTO = "as fast as the plastic melts; ours stays"
-SMALL_WALL = always(round(2.0 * pi * 6.5, 2), "a radius of 6.5 mm")  # of the walls that PrusaSlicer calls small
+SMALL_WALL = always(round(2.0 * pi * 6.5, 2), "a radius of 6.5 mm")  # length of walls that PrusaSlicer calls small
 PATTERNS = {
     **dict.fromkeys(("rectilinear", "alignedrectilinear", "line"), "rectilinear"),
     **dict.fromkeys(("cubic", "adaptivecubic", "supportcubic"), "cubic"),

@@ -34,10 +34,10 @@ MIDDLE = 0.4  # line widths: offset of a wall from the one below at which its ce
 BEYOND = 0.5  # line widths by which a line under leaning walls extends beyond them
 SHORTEST = 2.0  # line widths: a wall bridges shorter spans without a line under it
 RANK = 3  # after skins (slicer.fill.skin)
-# of the families of straight lines
+# directions of the families of straight lines
 TURNS_DEG = {"grid": [0.0, 90.0], "triangles": [0.0, 60.0, 120.0], "cubic": [0.0, 120.0, 240.0]}
 SAMPLES = 6  # layers from which the plastic in anchors is measured
-MOST_SHIFT = 0.25  # of the density that anchors and joints may take from the pattern; small areas consist mostly of border
+MOST_SHIFT = 0.25  # share of the density that anchors and joints may take from the pattern; small areas consist mostly of border
 # Length of the lines in a square period, in periods, averaged over all heights, with chords instead of arcs; integrated
 # numerically.
 GYROID_LENGTH = 2.454

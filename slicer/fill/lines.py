@@ -27,7 +27,7 @@ LinePattern = tuple[float, Draw]  # angle of the pattern's frame, deg, and its f
 # end.
 BorderEnds = tuple[EdgeIndex, Floats, Indices, Floats]
 MARGIN_MM = 0.1  # lines begin and end this far outside the box
-WEDGE = 0.65  # of the open wedge beside a sharp bend, along the border: beyond it the wedge is too narrow for a bead
+WEDGE = 0.65  # share of the open wedge beside a sharp bend, along the border: beyond it the wedge is too narrow for a bead
 LEAST_WEDGE, MOST_WEDGE = 0.1, 3.0  # spacings: a smaller wedge stays open
 LEAST_RUN = 0.5  # spacings: shortest run of a line around a corner
 FLAT = 0.05  # sine of the angle between line and border below which they hardly separate

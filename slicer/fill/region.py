@@ -8,11 +8,11 @@ from slicer.geometry.polygons import Polygons, larger, offset, opening, union
 from slicer.heights import SHELL_KEYS, shell_layers
 from slicer.modifiers import Place, combined, most_shell_layers, overlaid
 
-# of the line width: a narrower strip beside the wall along a cut needs no skin, since the walls of the two layers meet
+# share of the line width: a narrower strip beside the wall along a cut needs no skin, since the walls of the two layers meet
 THIN = 0.2
-BESIDE = 0.75  # of the line width: offset at which a wall, as on slopes, still rests on the one below
+BESIDE = 0.75  # share of the line width: offset at which a wall, as on slopes, still rests on the one below
 ANCHOR = 2.0  # line widths by which solid layers under walls overlap the infill around, like a bridge its anchors
-FEW_MM2 = 25.0  # of the line width squared: a smaller sparse area left beside a cut becomes solid
+FEW_MM2 = 25.0  # factor on the line width squared: a smaller sparse area left beside a cut becomes solid
 # smallest ironed area: the flat around the orifice has about this size and smooths such an area while it is printed
 LEAST_IRONED_MM2 = 2.0
 SOLID_KEYS = (*SHELL_KEYS, "infill_density", "solid_below_mm2")

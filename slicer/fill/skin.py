@@ -28,10 +28,10 @@ JOIN = 12.0  # spacings along the border: closer line ends are joined
 EDGE = 0.15  # spacings between the outermost lines and the extreme points, where a line would only touch
 TIP = 0.27  # and from a corner, where it would be only a dot
 RANK = 2  # after gaps (slicer.walls.walls), before infill
-TOUCHING = 0.01  # of the spacing: least overlap of neighbouring lines, however low a skin's flow
+TOUCHING = 0.01  # share of the spacing: least overlap of neighbouring lines, however low a skin's flow
 MOST_FLOW = 1.15  # only specks with hardly any room for lines need more
-LEVEL = 0.1  # of a spacing: heights that differ less are one row
-FEW_HIDDEN = 1.0  # of the line width squared: a smaller gap beside invisible lines stays open
+LEVEL = 0.1  # share of a spacing: heights that differ less are one row
+FEW_HIDDEN = 1.0  # share of the line width squared: a smaller gap beside invisible lines stays open
 SINGLE_MM = 1e-6  # a path whose ends differ less in height is a single line, which may be printed from either end
 
 

@@ -16,7 +16,7 @@ from slicer.geometry.edge_index import EdgeIndex, crossings, index_edges, within
 from slicer.geometry.polygons import Polygons
 from slicer.geometry.polyline import Segment
 
-SNAP = 1e-6  # of a step's length: a crossing this close to the step's end is at its end
+SNAP = 1e-6  # share of a step's length: a crossing this close to the step's end is at its end
 
 
 class Pieces(NamedTuple):

@@ -12,7 +12,7 @@ from mdp.mesh import Floats, Indices, Ints
 from mdp.topology.edges import opposites
 from slicer.geometry.polyline import Segment, orientation
 
-ROUNDING = 1e-14  # of the summed terms: ten times their error
+ROUNDING = 1e-14  # share of the summed terms: ten times their error
 MOST_FLIPS = 2000  # per side; a straight strip of 2 m needs 500, most polygons one; rounding must not make it endless
 
 

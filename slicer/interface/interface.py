@@ -37,7 +37,7 @@ from slicer.geometry.polyline import near_height
 from slicer.heights import Heights, part_heights
 
 SKIN = 0.8  # line widths inside the section from which a tip is off the outer wall, whose centre lies at 0.5
-SIDES = 32  # of circles around an edge
+SIDES = 32  # sides of a polygon that approximates a circle around an edge
 BELOW_MM = 0.02  # from a base plane to the section that represents its cut face, in the parts on both sides
 LEVEL = 1e-9  # a plane whose normal is closer to vertical than this meets a layer nowhere or everywhere
 LEAST_COSINE = 0.05  # a steeper plane is treated as having this cosine, so that projections onto it stay finite
@@ -45,7 +45,7 @@ AROUND_MM = 5.0  # support of a limb stays within this distance of its projectio
 COARSE_MM = 0.05  # tolerance to which a projection is simplified
 KEPT = 64  # parts whose faces and projections are cached
 STRIPE = 2.0  # line widths of grooves and ridges, so that two beads fit
-HOLE_SIDES = 24  # of the polygon of a hole
+HOLE_SIDES = 24  # sides of the polygon of a hole
 MOUTH_MM = 1.0  # holes extend this far beyond the base plane, into empty space, so that no film is left over them
 HALVINGS = 20
 WIDENED, MOST_WIDENED = 1.1, 60  # factor by which the step of a grid with too many positions grows, and number of tries

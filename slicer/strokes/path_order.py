@@ -177,7 +177,7 @@ def _reverse_stretches(paths: Paths, reach: int) -> float:
         forth = back = 0.0
         inner = last
         for j in range(i, min(i + reach, n)):
-            into, out = (2 * j + 1, 2 * j + 2) if fixed[j] else (2 * j + 2, 2 * j + 1)  # of path j in the reversed stretch
+            into, out = (2 * j + 1, 2 * j + 2) if fixed[j] else (2 * j + 2, 2 * j + 1)  # ends of path j in the reversed stretch
             if j > i:
                 forth += _way(at, 2 * j, 2 * j + 1)
                 back += _way(at, out, inner)

@@ -28,7 +28,7 @@ from slicer.geometry.polygons import contours
 from slicer.geometry.polyline import near_height, squared_distance_in_space
 from slicer.sectioning import Sections
 
-SPACING_MM = 1.0  # of candidate points along an outline
+SPACING_MM = 1.0  # distance between candidate points along an outline
 FEWEST = 8  # candidates per outline
 INNER, OUTER = 0.7, 0.55  # rewards of sharp inner and outer corners; a point in full sight costs 1
 TO_REAR = 5e-4  # cost per mm from the rear: between equally visible points, people look at the front
@@ -38,7 +38,7 @@ APART_MM = 3.0  # outlines farther apart than this have independent seams
 ALONG_MM, UP_MM = 2.5, 2.0  # spacing of samples along an outline, and upward
 FEWEST_SAMPLES = 6  # samples per outline
 RAYS = 24
-LIFT_MM = 0.1  # of a ray's start beside the outline
+LIFT_MM = 0.1  # distance of a ray's start from the outline
 FAR_MM = 1e5
 INWARD_MM = 1.0  # distance within which a point finds the face on which it lies
 ROUNDED = 4  # decimals, in mm, for equal vertices of two parts

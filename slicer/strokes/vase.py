@@ -25,7 +25,7 @@ from slicer.strokes.speed import fan_share, rising_fan
 
 SHRINKS = 0.999  # share of the area below: a layer with less is part of a tip
 MOST_IN_AIR, MOST_IN_AIR_MM = 0.5, 30.0  # share and length of a turn over air; the dry run refuses more
-PIECES = 16  # of the first and the last turn, each with its own flow
+PIECES = 16  # pieces of the first and the last turn, each with its own flow
 NO_APPROACH = np.zeros((0, 2))
 
 

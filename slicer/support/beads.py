@@ -43,9 +43,9 @@ from slicer.support.reachable import SMOOTH_MM
 from slicer.support.support import Supports
 
 JOIN = 2.0  # spacings within which neighbouring lines are joined to a zigzag
-ROOF_LAYERS = 3  # of a pedestal: the first one sags between the sparse lines, the last one is even
-PEDESTAL_DENSITY = 0.25  # of its inside: lines close enough for the roof to span, as in a raft's base
-SEAM = 0.1  # of a line width: overlap of lines with the outline, which holds them
+ROOF_LAYERS = 3  # layers in the roof of a pedestal: the first one sags between the sparse lines, the last one is even
+PEDESTAL_DENSITY = 0.25  # density inside a pedestal: lines close enough for the roof to span, as in a raft's base
+SEAM = 0.1  # share of a line width: overlap of lines with the outline, which holds them
 BRIM_RANK = -2000  # before all walls; the loops count down from it
 LEAST_COVERED_MM2 = 1e-3  # smaller areas are rounding
 

@@ -33,12 +33,12 @@ SMOOTH_MM = 0.05  # tolerance for simplifying support, whose edges come from sin
 SLIVER_MM = 0.02  # an area narrower than twice this may be left out, since its neighbours hold it
 SPECK_MM2 = 4.0 * SLIVER_MM**2  # smallest area that is not a sliver
 LEAST_MM2 = 1e-5  # smaller areas are rounding
-# of the radius: distance from plastic at which the centre of a disc may stand; its inner beads then lie on the edge
+# share of the radius: distance from plastic at which the centre of a disc may stand; its inner beads then lie on the edge
 BEYOND = 0.75
-SEGMENTS = 12  # of a full circle in round corners; corners lie on the circle, so the lean is never exceeded
+SEGMENTS = 12  # segments of a full circle in round corners; corners lie on the circle, so the lean is never exceeded
 AROUND_MM = 20.0  # support needs no more space around a part than its lean and this
 CELL_MM, COARSER = 0.5, 1.5  # grid for the height of the tip, and the factor by which it is coarsened
-MOST_PAIRS = 200_000_000  # of a grid cell and a standing point
+MOST_PAIRS = 200_000_000  # pairs of a grid cell and a standing point
 STEEPEST = 0.5  # horizontal mm per mm of height of a slope: support at its distance cannot hold steeper ones
 LOW_MM = 0.05  # up to this height above the base plane is the cut face itself
 

@@ -21,7 +21,7 @@ from slicer.support.reachable import BEYOND, COARSE_MM, ReachableAreas, dilate, 
 
 SLENDER = 12.0  # greatest height above a piece, in diameters of the piece; taller support sways under the nozzle
 LONG = 3.0  # distances between sparse lines; in a longer piece a zigzag would rest on the walls only at its turns, and sag
-TRIES = 5  # of a distance over which a piece grows into the free area beside it
+TRIES = 5  # steps of a distance over which a piece grows into the free area beside it
 
 
 class Piece(NamedTuple):

@@ -35,7 +35,7 @@ SLACK_MM = 0.01  # allowance for rounding of the lean
 LEDGE = 2.0  # line widths: a narrower ledge is self-supporting by the search's definition (mdp.support_need.patches)
 UNWANTED = "no support is wanted there"
 TIP_MM = 0.8  # height over which support may be thinner than a branch
-UNDER = (0.2, 0.5)  # of a disc's radius: distance beside an overhang at which a disc may stand; the smaller value is tried first
+UNDER = (0.2, 0.5)  # shares of a disc's radius: distance beside an overhang at which a disc may stand; the smaller is tried first
 MOST = 0.5  # share of an area to which a reason must apply
 HEAP = 12  # layers united at a time: a sweep over all of them at once meets many more crossings
 
@@ -289,7 +289,7 @@ def widen_foot(printed: Sequence[Polygons], areas: ReachableAreas, free: Polygon
     Each piece becomes up to twice as wide as the support on it is high, but grows by at most support_foot_mm on each side.
     """
     outlines, process = areas.sections.outlines, areas.process
-    widths_mm = [4.0 * piece.area() / perimeter_mm(piece) for piece in islands(printed[0])]  # of a long strip twice its width
+    widths_mm = [4.0 * piece.area() / perimeter_mm(piece) for piece in islands(printed[0])]  # for a long strip, twice its width
     enough_mm = process.support_foot_mm + 0.5 * max(widths_mm, default=0.0)  # higher support gets no wider foot
     layers = range(min(int(np.searchsorted(areas.heights.tip_mm[: len(printed)], enough_mm)) + 1, len(printed)))
     over, tops_mm = list[Polygons](), np.zeros(0)

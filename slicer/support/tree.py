@@ -37,13 +37,13 @@ from slicer.support.reachable import FINE_MM, LEAST_MM2, SLIVER_MM, SMOOTH_MM, R
 
 CELL_MM = 10.0  # wider contacts get a branch for every square of this size: its centre is down after half of that
 JOIN_MM = 0.8  # columns with a smaller gap than twice this are merged: sturdier, and no more plastic than two outlines
-CORNERS = 12  # of a trunk's outline
+CORNERS = 12  # corners of a trunk's outline
 MEETING = 0.8  # trunks lean towards each other only if they meet within this share of the remaining height
 THIN_MM = 0.1  # radius of the centres of a branch between obstacles: hardly more than one point
 TIDY_EVERY = 4  # layers between two removals of slits and slivers from branches at an obstacle
-INSET = 0.7  # of the lean: then right corners move by the lean
-STEPS = (0.3, 0.6, 1.0)  # of the lean: distances by which support moves aside, no farther than needed, since it widens by as much
-WIDEST = 1.3  # of the distance: limit for corners of widened areas; corners sharper than 100 degrees are cut off
+INSET = 0.7  # share of the lean: then right corners move by the lean
+STEPS = (0.3, 0.6, 1.0)  # shares of the lean: distances by which support moves aside, kept short, since it widens by as much
+WIDEST = 1.3  # factor on the distance: limit for corners of widened areas; corners sharper than 100 degrees are cut off
 
 
 @dataclass(frozen=True, eq=False)

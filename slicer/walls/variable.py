@@ -44,13 +44,13 @@ REACH, DEPTH, SPACING = 4, 5, 6  # columns of a table of ribs, after foot and di
 SHORTEST = 1.0  # nominal spacings: shorter loops are dropped
 TRANSITION = 0.7  # nominal spacings to both sides over which widths are smoothed
 STEP = 0.42  # nominal spacings: sampling of the boundary
-DOT = 0.3  # of its width: a shorter line is laid as a short thin segment
-DASH = 0.25  # of its width, by which that segment is thinner and longer
+DOT = 0.3  # share of a line's width: a shorter line is laid as a short thin segment
+DASH = 0.25  # share of a line's width, by which that segment is thinner and longer
 SLACK_MM = 0.01  # by which a region may be narrower than the least bead
-SHORT = 0.05  # of its width: least length of such a segment
+SHORT = 0.05  # share of a line's width: least length of such a segment
 THIN = 4.0  # least widths: a region narrower than one and longer than this is a wall, a shorter one the tip of a corner
 LOOK_MM = 0.4  # distance from a fork at which the directions of its branches are measured
-ABUT = 0.45  # of a bead's width: distance at which a line ends from the centre of a crossing bead
+ABUT = 0.45  # share of a bead's width: distance at which a line ends from the centre of a crossing bead
 
 
 @dataclass(frozen=True, eq=False)

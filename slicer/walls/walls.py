@@ -22,21 +22,21 @@ from slicer.walls.skeleton import ROOM, SPLIT, Rule
 from slicer.walls.variable import Wall, variable_walls
 
 WIDEST = 2.0  # nozzle diameters
-NARROW = 0.1  # of the line width: a narrower remainder beside walls is a corner
+NARROW = 0.1  # share of the line width: a narrower remainder beside walls is a corner
 BLUNT = 1.1  # mitre limit that adds nothing beyond a corner
-LEAST_REST = 0.12  # of the line width: narrower regions without a core behind them are corners, into which walls run
+LEAST_REST = 0.12  # share of the line width: narrower regions without a core behind them are corners, into which walls run
 LEAST_REST_MM2 = 1e-3  # smaller areas are rounding
 CORE_MM = 0.0125  # tolerance for simplifying the area inside the walls so far
 SLACK_MM = 0.01  # avoids slivers where the boundaries of an opening and its original coincide
 RANK = 1  # after walls, which have 0 and less
-LEAST_GAP = 0.12  # of the line width: a narrower gap between beads stays open, as with PrusaSlicer's classic walls
+LEAST_GAP = 0.12  # share of the line width: a narrower gap between beads stays open, as with PrusaSlicer's classic walls
 MOST_WIDTH = 2.0  # line widths of a bead, and spacings from which two lie side by side
 LEAST_TOP = 3.0  # line widths: narrower tops keep their walls, as in OrcaSlicer
 ROUNDS = 50  # greatest number of beads around a gap, counted like walls
 SPREAD = 0.25  # share by which the spacing of points of fuzzy walls varies
 FEWEST = 3  # points between the ends of a rough wall: a shorter wall stays smooth
-SHORTEST = 0.25  # of the line width: shorter pieces are not beads
-FEW = 0.6  # of the line width squared: a smaller gap beside the lines stays open, since it is not worth the travel
+SHORTEST = 0.25  # share of the line width: shorter pieces are not beads
+FEW = 0.6  # share of the line width squared: a smaller gap beside the lines stays open, since it is not worth the travel
 MOST_WIDER = 1.3  # greatest factor on a bead's width to compensate for the tips of its gap that it does not reach
 
 

@@ -23,7 +23,7 @@ from machine.quantities import duration
 from profiles.errors import JournalError
 
 MOST_WORDS = 4
-WORD_LENGTH = 200  # of one message: a lost connection takes two lines to describe
+WORD_LENGTH = 200  # longest message: a lost connection takes two lines to describe
 COLOURS = dict.fromkeys((PrintState.PRINTING, PrintState.FINISHING), "green") | dict.fromkeys(
     (*AWAY, PrintState.RESUMING), "yellow"
 )

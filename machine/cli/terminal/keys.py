@@ -44,7 +44,7 @@ class Keyboard:
         self._sure = self._leaving = False  # open questions
         self._left = self._cancelled = False
         self._stop_until_s = -inf  # a second e until then is the emergency stop
-        self._deadline_s: float | None = None  # of the question that Ctrl-C asked
+        self._deadline_s: float | None = None  # deadline of the question that Ctrl-C asked
         self._state, self._feed, self._flow = PrintState.PRINTING, 100.0, 100.0
         self._reported = (100.0, 100.0)
 

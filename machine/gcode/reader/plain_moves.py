@@ -22,8 +22,8 @@ LONGEST = 200
 MOST_DIGITS = 15  # integers below 2^53 are exact, as are the powers of ten to divide by: the quotient is rounded once
 NONE, F = -1, 6  # meaning of a letter, besides the axes 0 to 5
 MOST_TYPES = 64  # line types; slicers have about 15, a further one ends the run
-WHOLE_DIGITS, DECIMALS = 9, 12  # of a width or height, as in machine.gcode.reader.parse
-FIRST = (b"G0", b"G1", b";", b"\n")  # of lines that may be plain
+WHOLE_DIGITS, DECIMALS = 9, 12  # digits of a width or height, as in machine.gcode.reader.parse
+FIRST = (b"G0", b"G1", b";", b"\n")  # beginnings of lines that may be plain
 # The reader's state as floats: the axes, F, then the comments' values as in a remark, and the number of layers.
 PART, LAYER, TYPE, WIDTH, HEIGHT, LAYERS, STATE = range(7, 14)
 

@@ -18,9 +18,9 @@ from profiles.machine import Machine
 from slicer.paths import Unsupported
 
 DEFAULT_FEED = 1500.0
-REMARK_COLUMNS = 6  # of remark_rows: part, layer, type, width, height, acceleration
+REMARK_COLUMNS = 6  # columns of remark_rows: part, layer, type, width, height, acceleration
 ROOM = 1024  # remarks
-Words = Mapping[str, float]  # of one command; the last one of a repeated letter
+Words = Mapping[str, float]  # words of one command; the last one of a repeated letter
 
 
 class Columns(NamedTuple):
@@ -53,14 +53,14 @@ class Reader:
     columns: Columns
     rows: int = 0
     remarks: int = 0
-    feed_share: float = 1.0  # of M220, factor on every F
-    flow: float = 1.0  # of M221, factor on all filament
-    filament_mm2: float = 0.0  # of M200: E words are then mm³
+    feed_share: float = 1.0  # set by M220: factor on every F
+    flow: float = 1.0  # set by M221: factor on all filament
+    filament_mm2: float = 0.0  # set by M200: E words are then mm³
     followed: bool = False
     printing: float = inf
     travelling: float = inf
     motion: str = ""
-    retraction_mm: float = 3.0  # of G10 until M207 sets it: Marlin's default
+    retraction_mm: float = 3.0  # retraction by G10 until M207 sets it: Marlin's default
     retraction_feed: float = 2700.0
     retracted: bool = False
     nozzle_c: float = 0.0

@@ -14,7 +14,7 @@ from machine.link.protocol.window import FIRST_NUMBER_AGAIN, Window
 UNKNOWN_COMMAND = "nknown command"  # echoed with the text of an unknown command, before its ok
 ASKED_LIMIT = 10  # as many resends of a line mean that the cable is too noisy (OctoPrint's figure)
 LOOK_BACK = 200  # lines
-NOISE_LIMIT = 20  # of them resent: a tenth, at which a print has a blob on every layer
+NOISE_LIMIT = 20  # resends in the last LOOK_BACK lines: a tenth, at which a print has a blob on every layer
 QUESTION = "M105"
 QUESTIONS_MOST = 4  # unanswered in a row before the printer counts as gone
 IDLE_REPORTS = 2  # a printer that reports twice in a row that it is idle has lost the line in flight

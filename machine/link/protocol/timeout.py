@@ -21,8 +21,8 @@ class Timing:
     stall_s: float = 4.0
     stall_mute_s: float = 30.0
     sync_s: float = 3.0  # for an answer to M110, M115: a boot loader takes up to 2 s
-    drain_s: float = 0.5  # of silence after opening
-    quiet_s: float = 0.12  # of silence before a repeat: cable and ring buffer are empty by then
+    drain_s: float = 0.5  # silence after opening
+    quiet_s: float = 0.12  # silence before a repeat: cable and ring buffer are empty by then
     complaint_s: float = 0.5  # from `Error:checksum...` to its Resend, and from that to its ok, which follow at once
 
 

@@ -24,7 +24,7 @@ from machine.printing.servers.server import GcodeUpload, Identity, PrintServer, 
 from profiles.errors import ServerError
 
 FOLDER = "0:/gcodes/"
-DEFAULT_PASSWORD = "reprap"  # of a board without a password, which must be sent nevertheless
+DEFAULT_PASSWORD = "reprap"  # password of a board without one, which must be sent nevertheless
 WRITTEN_S = 120.0
 START_S, PAUSE_S, LOOK_S = 3.0, 120.0, 0.25
 MOST_PAGES = 16
@@ -54,7 +54,7 @@ class Duet(PrintServer):
         super().__init__(address, key, ca_file, tell)
         self._nozzle, self._bed = 1, 0  # heater numbers
         self._connected = False
-        self._last: PrintState | None = None  # of the print: "idle" does not say how it ended
+        self._last: PrintState | None = None  # last state of the print: "idle" does not say how it ended
         self._up_s = 0.0  # time since the board's reset, s
 
     def greet(self) -> Identity:

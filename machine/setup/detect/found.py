@@ -13,11 +13,11 @@ Value = float | str | bool | list[float]
 LIMITS, SPEED, ACCELERATION = "limits", "speed", "acceleration"
 PRINTING = "XYZ"
 ABC = "ABC"  # by ISO 841 rotary axes about X, Y and Z
-HALF_SQUARE = sin(radians(45.0))  # of half the angle of a right-angled corner
+HALF_SQUARE = sin(radians(45.0))  # sine of half the angle of a right-angled corner
 EXTRUDER = {"extruder_speed_mm_s": SPEED, "extruder_acceleration_mm_s2": ACCELERATION}  # key below machine -> of the axis E
 FARTHEST = 1e7  # mm or deg; a limit beyond it means none (LinuxCNC's 1e99)
 BOX, ROUND = True, False
-KINEMATICS = {  # of Klipper, Kalico and RepRapFirmware: whether X, Y and Z each move between two limits
+KINEMATICS = {  # whether X, Y and Z each move between two limits, for the kinematics of Klipper, Kalico and RepRapFirmware
     **dict.fromkeys(("cartesian", "corexy", "corexz", "hybrid_corexy", "hybrid_corexz", "generic_cartesian", "markforged"), BOX),
     **dict.fromkeys(("limited_cartesian", "limited_corexy", "limited_corexz", "corexyu", "corexyuv"), BOX),
     **dict.fromkeys(("delta", "deltesian", "lineardelta", "rotary_delta", "rotarydelta", "polar", "scara", "winch"), ROUND),

@@ -19,7 +19,7 @@ BUFFER = re.compile(r"\[OPT:[^,\]]*,\d+,(\d+)")
 VERSION = re.compile(r"\[VER:([^:\]\s]+)")
 JUNCTION_MM, MINUTE_S = 11, 60.0
 HARD_LIMITS, HOMING, HOME_SIDES, PULL_OFF, ROTARY = 21, 22, 23, 27, 376
-AT_ORIGIN = 1 << 3  # of $22: "Set machine origin to 0"
+AT_ORIGIN = 1 << 3  # bit of $22: "Set machine origin to 0"
 SPEEDS, ACCELERATIONS, TRAVELS = 110, 120, 130
 
 

@@ -1,8 +1,8 @@
-// Elements: how both pages find, make, fill and hear their elements, and words that several places say in the same way.
+// Elements: how both pages find, make, fill and listen to their elements, and texts that several places share.
 
 export const $ = (id) => document.getElementById(id);
 
-/** A new element with properties, classes and children; text is only ever put in as text. */
+/** A new element with properties, classes and children; text is always inserted as plain text. */
 export function made(tag, { text, className, ...properties } = {}, ...children) {
   const element = document.createElement(tag);
   if (text !== undefined) element.textContent = text;
@@ -12,32 +12,32 @@ export function made(tag, { text, className, ...properties } = {}, ...children) 
   return element;
 }
 
-/** A button with what it does; more: its other properties. */
+/** A button with its action; more: its other properties. */
 export const button = (text, onclick, more = {}, ...children) => made("button", { type: "button", text, onclick, ...more }, ...children);
 
 /** A row of a table; cells: texts and elements. */
 export const rowOf = (cells, tag = "td") => made("tr", {}, ...cells.map((cell) => made(tag, {}, cell)));
 
-/** The number that a field, a slider or a list has. */
+/** The number in a field, a slider or a list. */
 export const numberIn = (id) => Number($(id).value);
 
 /** Entries of a list of choices: [value, text]. */
 export const optionsOf = (entries, chosen) => entries.map(([value, text]) => made("option", { value, text, selected: value === chosen }));
 
-/** What is done at an event of elements, a table by their ids. */
+/** Handlers of an event, a table by element id. */
 export const listen = (event, acts) => Object.entries(acts).forEach(([id, act]) => $(id).addEventListener(event, act));
 
-/** What is done at a click on the elements that have a data-NAME, each with its data. */
+/** A click handler for the elements that have a data-NAME; it receives the data of each. */
 export const onData = (name, act, within = document) => within.querySelectorAll(`[data-${name}]`)
   .forEach((element) => element.addEventListener("click", () => act(element.dataset)));
 
-/** Which elements are hidden, which cannot be pressed, and what texts they have, tables by their ids; what is the same is not read aloud again. */
+/** Hide elements, disable them and set their texts, by tables of their ids; an unchanged text is not announced again. */
 const putAll = (property) => (values) => Object.entries(values).forEach(([id, value]) => { if ($(id)[property] !== value) $(id)[property] = value; });
 export const hide = putAll("hidden");
 export const disable = putAll("disabled");
 export const tell = putAll("textContent");
 
-/** A text that is seen where there is one. */
+/** A text that is visible if it is not empty. */
 export function sayIn(id, text) {
   tell({ [id]: text });
   hide({ [id]: !text });
@@ -47,10 +47,10 @@ export const pressed = (id, whether) => $(id).setAttribute("aria-pressed", wheth
 export const toggle = (name, whether) => document.body.classList.toggle(name, Boolean(whether));
 export const alike = (a, b) => JSON.stringify(a) === JSON.stringify(b);
 
-/** Terms with their texts, and with classes of those that have one. */
+/** Terms with their texts, and with classes for those that have one. */
 export const termsOf = (pairs) => pairs.flatMap(([name, text, className]) => [made("dt", { text: name }), made("dd", { text, className })]);
 
-/** A patch of a colour. */
+/** A colour swatch. */
 export function swatch(colour) {
   const mark = made("span", { className: "swatch" });
   mark.style.backgroundColor = colour;
@@ -65,7 +65,7 @@ export function duration(seconds) {
 
 export const partsInWords = (count) => `${count} part${count === 1 ? "" : "s"}`;
 
-/** now: an object, at first what was kept or usual has; keep(changes) changes it. storage: sessionStorage or localStorage; where a browser keeps nothing, a reload forgets. */
+/** now: an object, at first the kept values over the usual ones; keep(changes) changes it. storage: sessionStorage or localStorage; where a browser keeps nothing, a reload forgets. */
 export function keptIn(storage, key, usual) {
   const kept = { now: { ...usual } };
   const attempt = (act) => { try { act(); } catch { /* nothing is kept here */ } };
@@ -77,7 +77,7 @@ export function keptIn(storage, key, usual) {
   return kept;
 }
 
-/** Dark or light, as changed(dark) is told: what the system prefers until a person says otherwise, by the button or what this gives. */
+/** The theme, reported to changed(dark): the system's preference until the user chooses another with the button or a caller sets it by the returned function. */
 export function themeSwitch(changed) {
   const system = matchMedia("(prefers-color-scheme: dark)"), dark = () => told ?? system.matches;
   let told = null;
@@ -89,25 +89,25 @@ export function themeSwitch(changed) {
   return tell;
 }
 
-const NOTICES = new Map(); // what is said now, by what it is about
+const NOTICES = new Map(); // current notices, by subject
 
 /** Show a notice over the picture until its own source clears it by ""; the latest one is visible. */
 export function notice(text, about) {
-  if (NOTICES.get(about) !== text) NOTICES.delete(about); // what is said anew goes to the end
+  if (NOTICES.get(about) !== text) NOTICES.delete(about); // a new text moves to the end
   if (text) NOTICES.set(about, text);
   sayIn("notice", [...NOTICES.values()].at(-1) || "");
 }
 
-const UNTYPED = ["range", "radio", "checkbox", "button", "file"]; // inputs into which no letter goes
+const UNTYPED = ["range", "radio", "checkbox", "button", "file"]; // inputs without text entry
 
-/** Whether the focused element uses a key itself, so that the key is no command: a text field, a list, a slider, a button. */
+/** Whether the focused element uses a key itself, so that the key is not a command: a text field, a list, a slider, a button. */
 export function needsKey({ key, target: { tagName, type } }) {
   if (["SELECT", "TEXTAREA"].includes(tagName) || (tagName === "INPUT" && !UNTYPED.includes(type))) return true;
   if (tagName === "INPUT" && ["range", "radio"].includes(type) && /^(Arrow|Page|Home|End)/.test(key)) return true;
   return key === " " && ["BUTTON", "SUMMARY", "INPUT"].includes(tagName);
 }
 
-/** Has something done when the browser next draws, once however often it is asked for by then. */
+/** A function that requests an action in the browser's next frame, once for any number of requests. */
 export function nextFrame(act) {
   let asked = false;
   const begin = () => {
@@ -120,7 +120,7 @@ export function nextFrame(act) {
   };
 }
 
-/** Who is told what has changed: row, layers, colours, look. */
+/** Listeners to changes of row, layers, colours, look. */
 export function bells() {
   const heard = new Map();
   return {
@@ -129,22 +129,22 @@ export function bells() {
   };
 }
 
-/** A finding as a button that goes there, where it has a place. */
+/** A finding as a button that goes there, where it has a position. */
 export function findingButton({ severity, code, message, keys = "", part, layer, line }, onclick, { whole = "the whole file", ending = "", ...more } = {}) {
   const where = [part && `part ${part}`, layer && `layer ${layer}`, line && `line ${line}`].filter(Boolean).join(", ");
   return button("", onclick, { className: severity, title: keys, ...more }, made("b", { text: `${severity}: ${code}` }), message, made("small", { text: where ? where + ending : whole }));
 }
 
-/** An element put where a place of the picture is seen, in pixels; null: it is not. */
+/** Place an element at a point of the picture, in pixels; null: it is hidden. */
 export function putAt(element, place) {
   element.hidden = !place;
   if (place) element.style.transform = `translate(${place[0]}px, ${place[1]}px)`;
 }
 
-/** Colours with words, so many that they have room. */
+/** Swatches of colours with texts, at most the first 24. */
 export const swatches = (entries) => entries.slice(0, 24).map(([colour, text]) => made("span", {}, swatch(colour), text));
 
-/** Arrow keys, {key: step}, move the focus around a row or a column of elements; reached(element) is called before. */
+/** Arrow keys, {key: step}, move the focus along a row or a column of elements; reached(element) is called first. */
 export function moveFocus(container, selector, steps, reached = () => {}) {
   container.addEventListener("keydown", (event) => {
     const all = [...container.querySelectorAll(selector)], step = steps[event.key];
@@ -157,7 +157,7 @@ export function moveFocus(container, selector, steps, reached = () => {}) {
   });
 }
 
-/** chosen(panel's id) is called with every choice. */
+/** chosen(panel's id) is called on every choice. */
 export function tabsOf(chosen = () => {}) {
   const all = [...document.querySelectorAll("[role=tab]")];
   const choose = (tab) => {
@@ -172,7 +172,7 @@ export function tabsOf(chosen = () => {}) {
   moveFocus($("tabs"), "[role=tab]", { ArrowRight: 1, ArrowLeft: -1 }, choose);
 }
 
-/** What single keys do, where no element needs them itself; closed(): they do nothing now. */
+/** Actions of single keys, where no element needs the key itself; closed(): whether they are disabled. */
 export function onKeys(keys, closed) {
   addEventListener("keydown", (event) => {
     const act = keys[event.key] || keys[event.key.toLowerCase()];
@@ -191,10 +191,10 @@ export function moment(seconds) {
   return at.toDateString() === new Date().toDateString() ? clock(seconds) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
 }
 
-/** A value into a field, but for one that somebody types in, unless it is there anew. */
+/** Set a field's value, except while the user types in it, unless the field is new. */
 export const fill = (field, value, anew = false) => { if (anew || document.activeElement !== field) field.value = value; };
 
-/** A button of a row that takes away what it stands for. */
+/** A button that removes its row's item. */
 export const removeButton = (words, onclick) => button("×", onclick, { title: words, ariaLabel: words });
 
 /** Replace the children of an element by children() where their content has changed; a focused radio button or checkbox gets the focus again. */
@@ -207,12 +207,12 @@ export function putNew(element, content, children) {
   if (name) (element.querySelector(`[name="${name}"]:checked`) || element.querySelector(`[name="${name}"]`))?.focus();
 }
 
-/** Pairs of a name and a text, and of a class where the text has one. */
+/** Pairs of a name and a text, with a class where the text has one. */
 export const tellIn = (id, pairs) => putNew($(id), pairs, () => termsOf(pairs));
 
 export const listIn = (id, sentences) => putNew($(id), sentences, () => sentences.map((text) => made("li", { text })));
 
-/** Put rows {id, content, make()} into a list. Rows with the same content stay, so that the focus does, and so do rows in which the user types. */
+/** Put rows {id, content, make()} into a list. Rows with unchanged content stay, so that the focus does, and so do rows in which the user types. */
 export function putRows(rows, into) {
   const here = [...into.children], same = here.length === rows.length && rows.every(({ id }, k) => here[k].dataset.id === id);
   const known = new Map(here.map((element) => [element.dataset.id, element])), held = document.activeElement?.closest("[data-id]")?.dataset.id;

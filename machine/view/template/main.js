@@ -1,4 +1,4 @@
-// Main: the page put together: bytes to print, print to picture, hands to scene.
+// Main: builds the page: data to print, print to picture, user input to scene.
 
 import { $, bells, listen, notice, tell, themeSwitch, toggle } from "./elements.js";
 import { compileAll, pictureOf, standing } from "./moves/picture.js";
@@ -40,7 +40,7 @@ async function main() {
   document.documentElement.dataset.state = "ready";
 }
 
-/** Puts the work into view, and keeps it there when the table moves and when the frame is changed. */
+/** Fit the work into view, and keep it there when the table moves and when the frame is changed. */
 function fitting(print, scene, camera, picture, ring) {
   const [least, most] = print.box, middle = scaled(add(least, most), 0.5);
   const work = () => standing(print.chain, scene.place, scene.riding).work;
@@ -65,7 +65,7 @@ function fitting(print, scene, camera, picture, ring) {
   return fit;
 }
 
-/** The corner that sees most of the table's upper side while the parts are printed. */
+/** The corner from which most of the table's upper side is visible while the parts are printed. */
 function bestCorner({ header, chain }) {
   const seen = (yaw) => header.parts.reduce((sum, { rows = 1, tilt_deg: tilt = 0, turn_deg: turn = 0 }) => {
     const up = turned(chain.table(tilt, turn), [0, 0, 1]);

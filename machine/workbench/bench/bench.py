@@ -28,7 +28,7 @@ from profiles.profile import Profile
 
 USUAL = Given()
 MOST_STEPS = 200  # undo steps
-MOST_KEPT_FACES = 5_000_000  # of the models of all steps, some 25 bytes each: every scale makes a model of its own
+MOST_KEPT_FACES = 5_000_000  # faces in the models of all steps, some 25 bytes each: every scale makes a model of its own
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from profiles.errors import PlanError
 from profiles.frozen import Vector
 
 POINT_DIGITS, BOX_DIGITS = 3, 9  # digits after the point of mm, for points of marks and sides of boxes
-LEVEL = 1e-9  # of a cosine: after quarter turns a box is along the plate's axes again
+LEVEL = 1e-9  # tolerance of a cosine: after quarter turns a box is along the plate's axes again
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ from profiles.errors import JournalError, PlanError
 from profiles.profile import Profile
 
 LAST_WORD_S = 5.0  # a server that hangs is not waited for any longer
-LINES_KEPT = 100  # of the program's messages
+LINES_KEPT = 100  # number of the program's messages that are kept
 BEGIN, LEAVE = "begin", "leave"  # LEAVE: a print on a server continues without this program
 BEFORE_LIVE = {PrintState.CHECKING: "checking …", PrintState.PRINTING: "starting", PrintState.CANCELLING: "ending"}
 IS_READY = "Is the table empty and clean, is the filament loaded, and are all hands out of the machine?"

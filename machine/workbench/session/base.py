@@ -248,7 +248,7 @@ class Derived(Generic[Value]):
         self.progress: Any = None
         self.bench = session.bench
         self.done: Value | None = None
-        self.number = 0  # of the running task, or the last one
+        self.number = 0  # number of the running task, or the last one
         self._session, self._key_of, self._work, self._accept = session, key, task, accept
         self._by_itself, self._interrupts = by_itself, interrupts
         self._begun: object = None  # key of the running task, or the last one

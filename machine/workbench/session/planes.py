@@ -32,7 +32,7 @@ REST_S = 0.1  # pause in dragging after which the planes are tried more closely
 CHANGING_S = 0.2  # pause in changes of a bench after which it is prepared
 MOST_NUMBERED = 8  # benches whose numbers are known
 Invalid = dict[PlannedPart, str]  # planes that cannot be cut, with the reasons
-_numbers = count(1)  # of the benches of all sessions, which may share processes
+_numbers = count(1)  # numbers for the benches of all sessions, which may share processes
 
 
 class Readiness(Derived[None]):

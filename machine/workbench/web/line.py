@@ -23,8 +23,8 @@ MOST_COMMAND = 100_000  # characters
 BEAT_S = 0.5
 _states: WeakKeyDictionary[Observable, tuple[int, str]] = WeakKeyDictionary()
 CLOSED = "this bench is not open any more"
-CLOSED_CODE = 4404  # of a websocket of a closed bench
-GONE_CODE = 1006  # of one that ended without a close frame, RFC 6455
+CLOSED_CODE = 4404  # sent on a websocket of a closed bench
+GONE_CODE = 1006  # code of a websocket that ended without a close frame, RFC 6455
 MOST_OF_DEVICES = 1_000  # characters
 DEVICE_FUNCTIONS: dict[str, Callable[..., None]] = {"unpair": Door.unpair, "reopen": Door.reopen}
 DEVICE_COMMANDS = {name: arguments_of(function) for name, function in DEVICE_FUNCTIONS.items()}
@@ -38,7 +38,7 @@ async def talk(session: Session, socket: WebSocket) -> None:
         await until_either_ends(tell(session, lambda: snapshot(session), socket, beat_s), _hear(session, socket))
     finally:
         if not session.closed:
-            session.trials.settle()  # of a plane that the page was dragging
+            session.trials.settle()  # trials of a plane that the page was dragging
 
 
 async def refuse_closed(socket: WebSocket) -> None:

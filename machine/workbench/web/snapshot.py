@@ -36,7 +36,7 @@ from profiles.messages import advice, keys_in, option, settings_in, terminal_wor
 from profiles.places import OF_KIND
 from profiles.profile import Profile
 
-MOST_STEPS_LISTED = 30  # of those that can be undone, or done again
+MOST_STEPS_LISTED = 30  # greatest number of listed steps that can be undone or redone
 MOST_FINDINGS = 50  # in the list; the page of the print has all
 MOST_FACES = 2_000_000  # limit for drawing
 MODIFIER_MARGIN_MM = 3.0  # beyond the model's diagonal, to which the boxes of modifiers are shown

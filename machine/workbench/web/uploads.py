@@ -28,7 +28,7 @@ from profiles.messages import check_text, option
 from profiles.places import KINDS, kind_in
 
 PICTURE = "picture.png"  # in the folder of kept work
-TEXT_SUFFIX = ".toml"  # of plans and profiles
+TEXT_SUFFIX = ".toml"  # suffix of plans and profiles
 MIB = 2**20
 
 

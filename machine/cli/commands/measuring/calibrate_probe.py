@@ -20,8 +20,8 @@ from profiles.frozen import Vector
 from profiles.machine import Machine
 from profiles.profile import Profile
 
-BALL_HEIGHT_MM = 45.0  # of the ball's centre above the plate
-NOISE_MM = 0.005  # of the simulated probe
+BALL_HEIGHT_MM = 45.0  # height of the ball's centre above the plate
+NOISE_MM = 0.005  # noise of the simulated probe
 PLACE = (
     "fix a ball {diameter:g} mm in diameter, its centre {height:g} mm over the plate and {radius:g} mm from the middle towards +X"
 )

@@ -15,7 +15,7 @@ from profiles.foreign.imported import KINDS, Imported, Row, imported, unchanged_
 from profiles.foreign.read import read_config
 from profiles.places import own_folder
 
-LONGEST_TEXT = 40  # of an imported value in the table
+LONGEST_TEXT = 40  # longest imported value in the table
 WIDTH = 100
 AS_IT_IS, WORKED_OUT, LEFT = "taken as it is", "worked out", "left"
 

@@ -1,6 +1,6 @@
-// Beads: every extruding row at its true width and height, in the order of the print, so that the slider is a count.
-// Near: a prism of eight sides with a rounded shade, mitred where one bead follows the other, a blunt tip where it ends.
-// Far: a ribbon that faces the eye and is as wide as the bead's outline, in the light of its side and of its back.
+// Beads: every extruding row at its true width and height, in print order, so that the slider is a count.
+// Near: a prism of eight sides with rounded shading, mitred where one bead follows the other, a blunt tip where it ends.
+// Far: a ribbon that faces the camera and is as wide as the bead's outline, shaded as its side and its back.
 
 import { cornersOn, LIGHT, programOf } from "../picture/gl.js";
 import { bounds, clamp, cornersOf } from "../picture/math.js";
@@ -9,8 +9,8 @@ import { once, TEXELS } from "./rows.js";
 const AT_ONCE = 4096; // beads in one draw
 const CLOSE_PIXELS = 3; // a bead this wide on the screen is drawn as a prism
 
-// One vertex finds its own row: corners are numbered through, so many to a bead. Faster than instances, which cost as much as
-// a draw of their own on some cards and on all processors.
+// A vertex finds its own row: corners are numbered consecutively, a fixed number for each bead. Faster than instances, which cost as much
+// as a draw call of their own on some cards and on all processors.
 const BEAD_HEAD = `
 in vec4 corner;
 uniform highp sampler2D points;
@@ -35,7 +35,7 @@ vec3 unfolded(vec2 f) {
   if (v.z < 0.0) v.xy = (1.0 - abs(v.yx)) * vec2(v.x < 0.0 ? -1.0 : 1.0, v.y < 0.0 ? -1.0 : 1.0);
   return normalize(v);
 }
-/** Takes the bead's values; false where nothing is to be drawn. */
+/** Read the bead's values; false where nothing is drawn. */
 bool laid() {
   slot = first + gl_VertexID / corners;
   size = sizeOf(slot);
@@ -56,7 +56,7 @@ bool laid() {
 
 export const BEAD_NEAR = `${BEAD_HEAD}
 out vec3 normal;
-// corner: which end, side of the flat middle, place on the round across and up; ends 2, 3: the tips
+// corner: which end, side of the flat middle, position on the round across and up; ends 2, 3: the tips
 vec3 sideways(vec3 along, vec3 up) { return normalize(cross(along, up)); }
 vec3 mitred(vec3 mine, vec3 other) {
   vec3 middle = normalize(mine + other);
@@ -82,7 +82,7 @@ void main() {
 }`;
 
 export const BEAD_FAR = `${BEAD_HEAD}
-// corner: which end; 0: the edge of the side that is seen, 1: the edge of the back or the belly
+// corner: which end; 0: the edge of the visible side, 1: the edge of the back or the belly
 out float across;
 flat out float fold; // where the side ends, as a share of the ribbon
 flat out vec3 beneath, above;
@@ -95,7 +95,7 @@ void main() {
   wide = dot(wide, wide) > 0.0 ? normalize(wide) : over;
   if (dot(wide, over) < 0.0) wide = -wide;
   float tall = dot(wide, over) * size.y, deep = abs(dot(wide, side)) * size.x;
-  vec3 near = normalize(sight); // the ribbon lies where the bead comes nearest to the eye, or the model's surface would hide it
+  vec3 near = normalize(sight); // the ribbon is where the bead comes nearest to the camera, or the model's surface would hide it
   float out_ = 0.5 * (dot(near, side) * size.x + dot(near, over) * size.y);
   fold = tall / (tall + deep);
   across = corner.y;
@@ -107,7 +107,7 @@ void main() {
 }`;
 
 const PAINT_HEAD = `
-flat in vec4 paint; // a: 0 for what is drawn faint, with gaps to look through
+flat in vec4 paint; // a: 0 for faint beads, with gaps to look through
 flat in int slot;
 in vec3 seen;
 uniform vec4 clip; // see solidOf
@@ -193,7 +193,7 @@ export function beadsOf(gl, shapes, path) {
 const WIDEST_MM = 2;
 const widened = ([least, most]) => [least.map((x) => x - WIDEST_MM), most.map((x) => x + WIDEST_MM)];
 
-/** A function of a view and slots that gives [from, behind] of those runs of AT_ONCE slots that may be in the picture. */
+/** A function of a view and slots that returns the [from, behind] of those runs of AT_ONCE slots that may be in the picture. */
 function runsOf({ slots, points }) {
   const boxes = Array.from({ length: Math.ceil(slots / AT_ONCE) }, (_, k) => (
     widened(bounds(points.subarray(3 * k * AT_ONCE, 3 * Math.min((k + 1) * AT_ONCE, slots) + 3)))));
@@ -202,13 +202,13 @@ function runsOf({ slots, points }) {
     .filter(([from, behind, box]) => from < behind && inPicture(toClip, box));
 }
 
-/** Whether a box may be in the picture: not all of its corners lie beyond the same edge. */
+/** Whether a box may be in the picture: not all of its corners are beyond the same edge. */
 function inPicture(m, box) {
   const corners = cornersOf(box).map(([x, y, z]) => [0, 1, 3].map((k) => m[k] * x + m[k + 4] * y + m[k + 8] * z + m[k + 12]));
   return ![0, 1].some((axis) => [1, -1].some((sign) => corners.every((corner) => sign * corner[axis] > corner[2])));
 }
 
-/** Values by slot, TEXELS to a line. */
+/** Values by slot, TEXELS in a row of a texture. */
 function texture(gl, inside, format, type, content, each) {
   const held = gl.createTexture();
   gl.bindTexture(gl.TEXTURE_2D, held);
@@ -219,7 +219,7 @@ function texture(gl, inside, format, type, content, each) {
   return held;
 }
 
-/** One shape of a bead: its program, and the corners and triangles of as many beads as are drawn at once, made when first used. */
+/** One shape of a bead: its program, and the corners and triangles of all beads of one draw, made when first used. */
 function shapeOf(gl, program, { corners, faces }) {
   const each = corners.length / 4;
   const drawing = once(() => {

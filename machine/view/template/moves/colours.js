@@ -1,4 +1,4 @@
-// Colours: what the beads are coloured by, and the legend of each.
+// Colours: the quantities by which beads are coloured, and the legend of each.
 
 import { clamp, mix } from "../picture/math.js";
 import { PLAIN, rgb, wordOf } from "../picture/shapes.js";
@@ -29,7 +29,7 @@ const SCALES = {
   width: { unit: "mm", digits: 2, of: (rows) => (i) => rows.width[i] / 1000 },
 };
 
-/** Least and greatest of what extrudes, the outermost hundredth of the rows to either side left out. */
+/** Least and greatest value of extruding rows, without the outermost hundredth of the rows at either end. */
 function spread(rows, value) {
   const step = Math.max(1, Math.floor(rows.count / 200000)), seen = [];
   for (let i = 0; i < rows.count; i += step) if (rows.kind[i] === KIND.extrude) seen.push(value(i));
@@ -38,7 +38,7 @@ function spread(rows, value) {
   return [sorted[Math.floor(last * 0.01)], sorted[Math.ceil(last * 0.99)]];
 }
 
-/** Colours of all slots for a mode, hidden types left out (alpha 0), and the legend: entries or a scale. */
+/** Colours of all slots for a mode, with hidden types omitted (alpha 0), and the legend: entries or a scale. */
 export function coloured(mode, rows, path, extra) {
   const colours = new Uint32Array(path.texels);
   const { colour, legend } = mode in SCALES ? scaleOf(mode, rows, extra) : ownOf(mode, rows, extra);

@@ -1,5 +1,5 @@
-// Pace: a picture is drawn after a change. A slow one is drawn coarse at once, and whole in pieces when nothing moves.
-// The coarse one has every k-th layer, as high as k layers, of the lines visible from outside (of all, if the file does not name them), without fine curves.
+// Pace: a picture is drawn after a change. A slow one is drawn coarsely at once, and whole in pieces when nothing moves.
+// The coarse one has every k-th layer, as high as k layers, with the lines visible from outside (all lines if the file does not name them), and simplified curves.
 
 import { notice } from "../elements.js";
 import { clamp, countUpTo } from "../picture/math.js";
@@ -7,11 +7,11 @@ import { KIND, layerOf, TEXELS } from "./rows.js";
 import { PLAIN_TINT } from "./scene.js";
 
 const SEEN_OUTSIDE = /external perimeter|outer wall|wall-outer|overhang|bridge|top|bottom|solid|skin|support|skirt|brim|raft|ironing|custom/i;
-const TOPS = /top|ironing/i; // they close the model whatever layer they lie in
-const BEND_MM = 0.04; // by which a coarse bead may leave the path, a layer
+const TOPS = /top|ironing/i; // they close the model whatever their layer
+const BEND_MM = 0.04; // distance by which a coarse bead may leave the path, for each layer
 const AT_MOST = 12; // rows in one bead
 
-/** A path for beadsOf {slots, texels, points, sizes, verticals}, with the first and last row of each slot, in rising order. Slots without a size lie between strokes. */
+/** A path for beadsOf {slots, texels, points, sizes, verticals}, with the first and last row of each slot, in rising order. Slots without a size are between strokes. */
 export function coarseOf(rows, path, k) {
   const kept = keptRows(rows, k), bend = (k * BEND_MM) ** 2, points = [], first = [], last = [];
   let slot = -1;
@@ -21,7 +21,7 @@ export function coarseOf(rows, path, k) {
     if (!kept[row]) continue;
     const begin = path.slot(row);
     if (begin !== slot || !points.length) {
-      if (points.length) bead(-1, last[last.length - 1], begin); // the way to the next stroke
+      if (points.length) bead(-1, last[last.length - 1], begin); // the path to the next stroke
       else place(begin);
     }
     let end = row;
@@ -36,7 +36,7 @@ export function coarseOf(rows, path, k) {
   return coarsePath(rows, path, k, points, Int32Array.from(first), Int32Array.from(last));
 }
 
-/** Which rows are drawn at all. */
+/** The rows that are drawn at all. */
 function keptRows(rows, k) {
   const outside = rows.types.map((name) => SEEN_OUTSIDE.test(name)), tops = rows.types.map((name) => TOPS.test(name));
   const told = outside.some(Boolean), kept = new Uint8Array(rows.count), ends = new Set();
@@ -50,13 +50,13 @@ function keptRows(rows, k) {
   return kept;
 }
 
-/** Whether the row after one is the same bead going on, and lies where that ends. */
+/** Whether the row after one continues its bead from its end. */
 function goesOn(rows, path, kept, row, slot) {
   const next = row + 1;
   return next < rows.count && kept[next] && rows.type[next] === rows.type[row] && rows.part[next] === rows.part[row] && path.slot(next) === slot;
 }
 
-/** Whether all points between two lie near the straight way from one to the other. */
+/** Whether all points between two are near the straight line between them. */
 function straight(p, from, to, bend) {
   const a = 3 * from, b = 3 * to, x = p[b] - p[a], y = p[b + 1] - p[a + 1], z = p[b + 2] - p[a + 2], way = x * x + y * y + z * z;
   for (let i = a + 3; i < b; i += 3) {
@@ -89,7 +89,7 @@ export function coarseColours(coarse, path, colours) {
   return new Uint8Array(own.buffer);
 }
 
-/** Ranges of slots that are drawn coarse and fine for ranges of rows: the slider's layer, and those after the last coarse one, are fine. */
+/** Ranges of slots to draw coarsely and finely for ranges of rows: the slider's layer, and those after the last coarse one, are fine. */
 export function dividedRanges({ rows, path }, coarse, ranges) {
   const rough = [], fine = [];
   for (const range of ranges) {
@@ -105,18 +105,18 @@ export function dividedRanges({ rows, path }, coarse, ranges) {
 }
 
 const SLOW_MS = 50;
-const LONG_MS = 600; // a whole picture that takes longer is preceded by a coarse one also where only a choice has changed
-const TOLD_MS = 1500; // and of one that takes longer it is told how far it is
-const PIECE_MS = 120; // of a whole picture at a time: so long may a hand wait
-const LEAST = 5000; // beads in a piece, and in a print whose first picture is a coarse one: how fast pictures come is not known yet
+const LONG_MS = 600; // a whole picture that takes longer follows a coarse one also after a mere change of options
+const TOLD_MS = 1500; // the progress of one that takes longer is shown
+const PIECE_MS = 120; // for a piece of a whole picture: the longest delay of an input
+const LEAST = 5000; // beads in a piece, and in a print whose first picture is coarse: the speed of drawing is not known yet
 const STILL_MS = 180;
-const COARSE_ROWS = 30000; // of so many rows every second layer makes a quick picture
+const COARSE_ROWS = 30000; // for this number of rows every second layer makes a fast picture
 const COARSEST = 32;
 
-/** {ask, moved}: ask() after any change, moved() whenever eye or slider move. Pictures never pile up: each waits for the card. */
+/** {ask, moved}: ask() after any change, moved() whenever camera or slider move. Pictures never pile up: each waits for the card. */
 export function paceOf(gl, painter, count) {
   const { dataset } = document.documentElement;
-  let state = "idle", timer = 0; // the timer runs while eye or slider move
+  let state = "idle", timer = 0; // the timer runs while camera or slider move
   let stale = false, hasty = false, unbegun = false; // changed since; by a movement; only a coarse picture is there
   let level = 2 ** Math.max(Math.ceil(Math.log2(count / COARSE_ROWS)), 1), piece = LEAST, spent = 0, whole = { ms: 0, rows: 1 };
   const tell = (now) => { state = dataset.picture = now; };
@@ -188,7 +188,7 @@ export function paceOf(gl, painter, count) {
   return { ask, moved };
 }
 
-/** Calls back when the card has done all that it was told, or will never do it. */
+/** Call back when the card has executed all commands, or never will. */
 function finished(gl, then) {
   const fence = gl.fenceSync(gl.SYNC_GPU_COMMANDS_COMPLETE, 0);
   gl.flush();

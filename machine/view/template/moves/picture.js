@@ -1,4 +1,4 @@
-// Picture: all that is drawn of a print, in the right order, for the scene as it is chosen; how much at a time and when is the pace's affair.
+// Picture: draws everything of a print, in the right order, for the scene as it is chosen; moves/pace.js decides how much at a time and when.
 
 import { $ } from "../elements.js";
 import { showLegend } from "../panel/controls.js";
@@ -13,9 +13,9 @@ import { once } from "./rows.js";
 import { drawnRanges, PLAIN_TINT } from "./scene.js";
 import { MARK_FRAGMENT, MARK_VERTEX, MARKS, marksOn, waysOn } from "./ways.js";
 
-const BEAD_MM = 0.4; // a usual bead, by which is told how near the eye is
+const BEAD_MM = 0.4; // a usual bead, from which the distance of the camera is estimated
 
-/** Everything on the graphics card; made anew when the context was lost. */
+/** Everything on the graphics card; rebuilt after the context was lost. */
 function stageOf(gl, print, dark) {
   const { rows, path, header, marks, surfaces, span } = print, { parts } = header;
   const partColour = (part) => rgb(part.colour), planes = planesOf(parts, partColour), shapes = shapesOf(gl);
@@ -32,7 +32,7 @@ function stageOf(gl, print, dark) {
   };
 }
 
-/** {at(k): the path of every k-th layer with its drawing, made when first asked for, painted by paint(colours of all slots)}. */
+/** {at(k): the path of every k-th layer with its drawing, made when first used, painted by paint(colours of all slots)}. */
 function coarseOn(gl, shapes, print) {
   const made = new Map();
   let painted = null;
@@ -52,10 +52,10 @@ function coarseOn(gl, shapes, print) {
   return { at, paint };
 }
 
-/** {table, cradle, nozzle, hotEnd, boxes}: the machine's own, drawn as bodyOf does. */
+/** {table, cradle, nozzle, hotEnd, boxes}: bodies of the machine, drawn as bodyOf does. */
 const bodiesOn = (gl, machine, dark) => Object.fromEntries(Object.entries(bodiesOf(machine, dark)).map(([name, shapes]) => [name, bodyOf(gl, shapes)]));
 
-/** Where table, cradle, work and head stand in the frame that is shown, for places of the five axes. */
+/** Matrices of table, cradle, work and head in the displayed frame, for positions of the five axes. */
 export function standing(chain, place, riding) {
   const table = chain.table(place[3], place[4]), tip = moved(sub(place.slice(0, 3), chain.tool));
   if (!riding) return { work: table, cradle: chain.cradle(place[3]), head: tip };
@@ -63,7 +63,7 @@ export function standing(chain, place, riding) {
   return { work: IDENTITY, cradle: multiply(back, chain.cradle(place[3])), head: multiply(back, tip) };
 }
 
-/** How the eye sees the scene now: {work, cradle, head, beads, below, seenAt, ranges, moving, lift, size}. */
+/** The current view of the scene: {work, cradle, head, beads, below, seenAt, ranges, moving, lift, size}. */
 function viewOf(print, scene, camera, size, density) {
   const seenAs = camera.seen(size), stand = standing(print.chain, scene.place, scene.riding);
   const [work, cradle, head] = [stand.work, stand.cradle, stand.head].map(seenAs);
@@ -72,12 +72,12 @@ function viewOf(print, scene, camera, size, density) {
     work, cradle, head, beads: { ...work, eye, pixels, ...section }, section, below: eye[2] < 0,
     seenAt: (shift) => seenAs(multiply(stand.work, moved(shift))),
     ranges: drawnRanges(print, scene), moving: { slot: print.path.slot(scene.row), share: scene.share },
-    lift: 0.012 / camera.distance, // in depth, by which what lies on a surface is seen before it
+    lift: 0.012 / camera.distance, // depth offset that shows marks before the surface on which they are
     size: clamp(pixels * 1.8, 3.5, 13) * density,
   };
 }
 
-/** The first so many slots of ranges, and what is left. */
+/** Split ranges after a number of slots: [the first ones, the rest]. */
 function firstOf(ranges, most) {
   const taken = [], left = [];
   for (const range of ranges) {
@@ -89,14 +89,14 @@ function firstOf(ranges, most) {
   return [taken, left];
 }
 
-/** The beads with every k-th layer for all, the last ones as they are. */
+/** The beads: every k-th layer of all, the last ones complete. */
 function paintCoarse({ beads, coarse }, print, seen, k) {
   const { path, beads: rough } = coarse.at(k), divided = dividedRanges(print, path, seen.ranges);
   rough.draw(seen.beads, divided.rough, { slot: -1, share: 1 });
   beads.draw(seen.beads, divided.fine, seen.moving);
 }
 
-/** All but the beads. */
+/** Everything but the beads. */
 function paintRest(stage, print, scene, seen) {
   const { on } = scene, { work, cradle, head, below, lift } = seen, { bodies } = stage;
   const paintTable = (look) => {
@@ -105,7 +105,7 @@ function paintRest(stage, print, scene, seen) {
   };
   if (on.machine && !below) paintTable({});
   if (on.machine) bodies.nozzle.draw(head);
-  if (scene.tried) { // the whole model as another row of the front would cut it; cut into one part only it has the first colour
+  if (scene.tried) { // the whole model as another row of the front would cut it; as a single part it has the first colour
     const cuts = cutsOf(scene.tried);
     for (const { range } of print.surfaces.parts) stage.model.draw(work, { cuts, range });
   } else {
@@ -118,7 +118,7 @@ function paintRest(stage, print, scene, seen) {
   bodies.boxes.draw(head, { ghost: 0.14, strength: 0.5 });
 }
 
-const SIGNS = { travels: ["travels"], seams: ["seams"], retractions: ["retracts", "primes"] }; // by what is switched on
+const SIGNS = { travels: ["travels"], seams: ["seams"], retractions: ["retracts", "primes"] }; // by name of the toggle
 
 function paintPath({ signs }, ranges, on, seen, lift, size) {
   for (const { firstRow, endRow, tint } of ranges)
@@ -137,12 +137,12 @@ function paintModel(stage, print, scene, { seenAt, section }, lift) {
   const piece = (solid, k) => [k, k + 1].map((n) => (n * solid.corners) / cut.length);
   if (scene.on.directions) cut.forEach((part, k) => stage.arrows.draw(seen(part), { range: piece(stage.arrows, k) }));
   if (!scene.on.planes) return;
-  const [, ...above] = cut.map((part, k) => [seen(part), k]); // the first part stands on the build plate
+  const [, ...above] = cut.map((part, k) => [seen(part), k]); // the first part is on the build plate
   for (const [at, k] of above) stage.rims.draw(at, { range: piece(stage.rims, k) });
   for (const [at, k] of above) stage.planes.draw(at, { strength: 0.3, range: piece(stage.planes, k) });
 }
 
-/** The slot of the bead at a place of the picture, or -1: one pixel drawn with numbers for colours. */
+/** The slot of the bead at a point of the picture, or -1: one pixel is drawn with numbers as colours. */
 function slotAt(gl, stage, { beads, ranges }, [x, y]) {
   if (!stage.beads || !ranges.length) return -1;
   const frame = frameOf(gl, 0), byte = new Uint8Array(4);
@@ -157,9 +157,9 @@ function slotAt(gl, stage, { beads, ranges }, [x, y]) {
   return new Int32Array(byte.buffer)[0] - 1;
 }
 
-const COARSE_SHARE = 0.6; // of the canvas' width and height, drawn while all moves slowly
+const COARSE_SHARE = 0.6; // share of the canvas' width and height, drawn while everything moves slowly
 
-/** Has the card compile all programs while the page reads the print. */
+/** Let the card compile all programs while the page reads the print. */
 export function compileAll(gl) {
   const pairs = [[BEAD_FAR, PAINT_FAR], [BEAD_NEAR, PAINT_NEAR], [SOLID_VERTEX, SOLID_FRAGMENT], [MARK_VERTEX, MARK_FRAGMENT]];
   pairs.forEach((pair) => programOf(gl, ...pair));
@@ -179,7 +179,7 @@ export function pictureOf(gl, print, scene, camera, bells, showMarkers) {
     tell();
   };
   const reds = () => {
-    const red = scene.tried && scene.risky === "printed" ? "none" : scene.risky; // what another row of the front leaves risky is not known face by face
+    const red = scene.tried && scene.risky === "printed" ? "none" : scene.risky; // the risky faces of another row of the front are not known individually
     painter.stage?.model?.paint(surfaceColours(print.surfaces, ownInk, red));
   };
   const build = () => {
@@ -199,13 +199,13 @@ export function pictureOf(gl, print, scene, camera, bells, showMarkers) {
   addEventListener("beforeprint", () => {
     painter.begin();
     painter.step(Infinity);
-    const picture = Object.assign($("picture"), { width: canvas.width, height: canvas.height }); // WebGL's own is empty by the time that pages are laid out
+    const picture = Object.assign($("picture"), { width: canvas.width, height: canvas.height }); // WebGL's own canvas is empty when the browser lays out printed pages
     picture.getContext("2d").drawImage(canvas, 0, 0);
   });
   return { canvas, ask: pace.ask, moved: pace.moved, rowAt: (event) => print.path.row(painter.slotUnder(event)) };
 }
 
-/** Draws coarse and at once, coarse(k), or fine and piece by piece, begin() and step(beads) until it is done(). */
+/** Draw coarsely at once, coarse(k), or finely and in pieces, begin() and step(beads) until it is done(). */
 function painterOf(gl, print, scene, camera, showMarkers) {
   const { canvas } = gl, painter = { stage: null, shown: null };
   let frames = null, fine = null, left = [];
@@ -213,7 +213,7 @@ function painterOf(gl, print, scene, camera, showMarkers) {
     const size = sizeOf(canvas, share), seen = viewOf(print, scene, camera, size, density() * share);
     return { size, whole: sizeOf(canvas), seen, rows: Math.max(countSlots(seen.ranges), 1) };
   };
-  /** whole: the size of the canvas when the picture was begun: smooth edges are shown at that size alone. */
+  /** whole: the size of the canvas when the picture was begun: smooth edges are shown only at that size. */
   const show = (frame, { seen, whole }) => {
     if (whole.join() !== [canvas.width, canvas.height].join()) [canvas.width, canvas.height] = whole;
     frame.show();
@@ -223,7 +223,7 @@ function painterOf(gl, print, scene, camera, showMarkers) {
   };
   painter.build = () => {
     painter.stage = stageOf(gl, print, scene.dark);
-    frames = { still: frameOf(gl, 4), moving: frameOf(gl, 0) }; // with smooth edges, and quick
+    frames = { still: frameOf(gl, 4), moving: frameOf(gl, 0) }; // with smooth edges, and fast
   };
   painter.dress = () => { if (painter.stage) painter.stage.bodies = bodiesOn(gl, print.header.machine, scene.dark); };
   painter.drop = () => { painter.stage = null; };

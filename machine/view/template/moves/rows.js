@@ -1,4 +1,4 @@
-// Rows: the moves of the print from the page's data (CONTRIBUTING.md has their format), one row for each straight move, and what is computed from them at the start.
+// Rows: the moves of the print from the page's data (CONTRIBUTING.md has their format), one row for each straight move, and values computed from them at the start.
 
 import { bounds, countUpTo, IDENTITY, length, mix, moved, multiply, RAD, rotated, sub, undone, unit } from "../picture/math.js";
 import { surfacesOf } from "../picture/shapes.js";
@@ -6,10 +6,10 @@ import { surfacesOf } from "../picture/shapes.js";
 const MAGIC = "TILTVW01";
 const HOLDS = { u8: Uint8Array, u16: Uint16Array, i32: Int32Array, f32: Float32Array, f64: Float64Array };
 
-/** The block of the letters that stand in the page: a header and named arrays behind base64 and deflate. */
+/** The data block in the page: a header and named arrays, compressed by deflate and encoded in base64. */
 export const openBlock = (text) => blockOf(Uint8Array.fromBase64 ? Uint8Array.fromBase64(text) : Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0)));
 
-/** {header, array}; array(name) decodes a column list: one typed array a column, in whole multiples of the scale. */
+/** {header, array}; array(name) decodes a column list: one typed array for each column, in integer multiples of the scale. */
 export async function blockOf(pressed) {
   const stream = new Blob([pressed]).stream().pipeThrough(new DecompressionStream("deflate"));
   const bytes = new Uint8Array(await new Response(stream).arrayBuffer()), decoder = new TextDecoder(), magic = decoder.decode(bytes.subarray(0, 8));
@@ -32,7 +32,7 @@ function columnsOf(buffer, start, told) {
   return Array.from({ length: width }, (_, k) => Holds.from({ length: count }, (_, i) => flat[i * width + k]));
 }
 
-/** Running sums of zigzag differences whose bytes are sorted by weight. */
+/** Running sums of zigzag differences whose bytes are sorted by significance. */
 function summed(planes, out) {
   const n = out.length, second = 2 * n, third = 3 * n;
   let sum = 0;
@@ -44,21 +44,21 @@ function summed(planes, out) {
   return out;
 }
 
-/** Chain: how the table stands for values of its two rotary axes, and where the tip is on it.
+/** Chain: the table's pose for values of its two rotary axes, and the position of the tip on it.
  * tip = tilt_point + R_tilt (turn_point + R_turn w - tilt_point), X Y Z = tip + tool; each R turns right-handed about its
  * axis by -sign (value - zero). The rule of LinuxCNC's xyzac-trt-kins for any two axes. */
 export function chainOf(machine) {
   const { tilt, turn, tool_mm: tool } = machine;
   const arm = sub(turn.point_mm, tilt.point_mm);
   const rotation = (axis, value) => rotated(unit(axis.axis), -axis.sign * (value - axis.zero_deg) * RAD);
-  /** What tilts with the table but does not turn with it, from coordinates about the workpiece origin to the machine. */
+  /** The matrix of bodies that tilt with the table but do not turn with it, from coordinates about the workpiece origin to the machine. */
   const cradle = (tiltDeg) => multiply(moved(tilt.point_mm), multiply(rotation(tilt, tiltDeg), moved(arm)));
   /** From the workpiece frame to the machine frame less the tool: positions of the tip. */
   const table = (tiltDeg, turnDeg) => multiply(cradle(tiltDeg), rotation(turn, turnDeg));
   return { cradle, table, tool };
 }
 
-/** Turns places X Y Z tilt turn into workpiece points; keeps the matrix while the pose stays. */
+/** Convert positions X Y Z tilt turn into workpiece points; the matrix is kept while the pose does not change. */
 export function workpieceOf(chain) {
   const [tx, ty, tz] = chain.tool;
   let m = IDENTITY, tiltNow = NaN, turnNow = NaN, vertical = [0, 0];
@@ -84,7 +84,7 @@ function octahedral(v) {
   return [Math.round(a * 32767), Math.round(b * 32767)];
 }
 
-export const TEXELS = 2048; // in a line of the textures that hold the path
+export const TEXELS = 2048; // in a row of the textures that hold the path
 export const KIND = { travel: 0, extrude: 1, retract: 2, rotate: 3, wipe: 4, prime: 5 };
 const WALLS = /^(external perimeter|outer wall|wall-outer)$/i;
 
@@ -99,7 +99,7 @@ export function rowsOf({ header, array }) {
   return { ...columns, ...jumps, count: columns.line.length, axes: array("end"), types: header.types, layers, first };
 }
 
-/** X Y Z tilt turn where a row begins (share 0) to where it ends (share 1). */
+/** X Y Z tilt turn between the start of a row (share 0) and its end (share 1). */
 export function placeAt(rows, row, share) {
   const jump = countUpTo(rows.jumpRow, row) - 1;
   const jumped = jump >= 0 && rows.jumpRow[jump] === row;
@@ -109,10 +109,10 @@ export function placeAt(rows, row, share) {
   });
 }
 
-/** The path on the workpiece for drawing: a slot for each row, and an empty one before a row that begins away from the end of the last. Slot s goes from points[s] to points[s + 1]; slot(row) is a row's. */
+/** The path on the workpiece for drawing: a slot for each row, and an empty one before a row that does not begin at the end of the last. Slot s goes from points[s] to points[s + 1]; slot(row) is a row's. */
 function pathOf(rows, chain) {
   const jumps = rows.jumpRow.filter((row) => row > 0), slots = rows.count + jumps.length;
-  const texels = Math.max(Math.ceil((slots + 2) / TEXELS), 1) * TEXELS; // whole lines of a texture
+  const texels = Math.max(Math.ceil((slots + 2) / TEXELS), 1) * TEXELS; // whole rows of a texture
   const points = new Float32Array(3 * texels), verticals = new Int16Array(2 * texels), sizes = new Uint16Array(2 * texels);
   const place = workpieceOf(chain), [x, y, z, tilt, turn] = rows.axes;
   let jump = 0, slot = 0;
@@ -132,7 +132,7 @@ function pathOf(rows, chain) {
   return { slots, texels, points, verticals, sizes, slot: slotOf, row: (slot) => slot - countUpTo(breaks, slot) };
 }
 
-/** Rows at which something stands to be marked: where an outer wall begins, where filament is pulled back, pushed forward. */
+/** Rows with marks: start of an outer wall, retraction, prime. */
 function marksOf(rows) {
   const wall = rows.types.map((name) => WALLS.test(name)), seams = [], retracts = [], primes = [];
   for (let i = 0; i < rows.count; i++) {
@@ -144,7 +144,7 @@ function marksOf(rows) {
   return { seams, retracts, primes };
 }
 
-/** Volume that a row lays, mm3 a second, as the file asks for; 0 where nothing flows. */
+/** Volume rate of a row, mm3/s, as the file requests; 0 without flow. */
 function flowOf(rows, path, area) {
   const p = path.points;
   return (i) => {
@@ -155,10 +155,10 @@ function flowOf(rows, path, area) {
   };
 }
 
-/** The layer that a row belongs to, as a place in the list of layers; -1 before the first. */
+/** Index of the layer to which a row belongs; -1 before the first. */
 export const layerOf = (rows, row) => countUpTo(rows.first, row) - 1;
 
-/** A value that is worked out when it is first asked for. */
+/** A value that is computed when first needed. */
 export function once(make) {
   let value;
   return () => (value === undefined ? (value = make()) : value);
@@ -174,7 +174,7 @@ export async function printOf(text) {
   return { header, chain, rows, path, surfaces, layerTime, patternOf: block.array("text")[0], ...worked };
 }
 
-/** What is to be seen of the work: plastic and surfaces, else the room over the table. */
+/** The visible extent of the work: plastic and surfaces, otherwise the room over the table. */
 function boxOf({ points, sizes }, surfaces, { table: { radius_mm: r, thickness_mm: t } }) {
   const laid = bounds(points, (place) => place > 0 && sizes[2 * place - 2] > 0), seen = [...laid, ...(surfaces ? bounds(surfaces.places) : [])].flat();
   return bounds(seen.length ? seen : [-r, -r, -t, r, r, r]);

@@ -1,4 +1,4 @@
-// Scene: what the person has chosen to see; the only state that the page keeps.
+// Scene: what the user has chosen to see; the only state that the page keeps.
 
 import { add, carried, clamp, countUpTo, length, mix } from "../picture/math.js";
 import { chainOf, placeAt } from "./rows.js";
@@ -13,7 +13,7 @@ export function sceneOf(print, bells) {
     on: { beads: true, travels: false, retractions: false, seams: false, machine: header.machine.known, planes: false, directions: false, findings: true },
   };
   scene.layers = () => (scene.part === null ? rows.layers : rows.layers.filter((layer) => layer.part === scene.part));
-  /** The layers between which all is drawn, places in the list. */
+  /** The range of layers that is drawn, as indices into the list. */
   const limit = (low, high) => {
     const before = [scene.low, scene.high];
     scene.high = clamp(high, 0, Math.max(scene.layers().length - 1, 0));
@@ -42,23 +42,23 @@ export function sceneOf(print, bells) {
   scene.choosePart = (index) => {
     scene.part = index;
     scene.low = 0;
-    scene.go(Math.max(scene.row, scene.layers().at(-1)?.last ?? 0)); // all of it is printed
+    scene.go(Math.max(scene.row, scene.layers().at(-1)?.last ?? 0)); // the whole part is printed
     bells.ring("layers");
   };
-  /** The highest layer drawn: the print is shown at its end. */
+  /** Set the highest layer drawn: the print is shown at its end. */
   scene.chooseHigh = (place) => scene.go(scene.layers()[clamp(place, 0, scene.layers().length - 1)]?.last ?? scene.row);
-  /** The lowest one; the highest is never below it. */
+  /** Set the lowest layer drawn; the highest is never below it. */
   scene.chooseLow = (place) => {
     if (place > scene.high) scene.chooseHigh(place);
     limit(place, scene.high);
   };
   scene.beads = () => scene.on.beads && !scene.tried;
-  /** Look at the cuts of another row of the front; null: at what was made. */
+  /** Show the cuts of another row of the front; null: those of the print. */
   scene.tryRow = (row) => {
     scene.tried = row;
     bells.ring("tried");
   };
-  /** Without a path: the table stands as it does for a part, or level. */
+  /** Without a path: the table is posed as for a part, or level. */
   scene.standFor = (part) => {
     scene.place = restingPlace(header, part);
     bells.ring("row");
@@ -66,7 +66,7 @@ export function sceneOf(print, bells) {
   return scene;
 }
 
-/** Without a path the machine waits, level or as for a part, the head well above everything. */
+/** Without a path the machine waits, level or posed as for a part, with the head well above everything. */
 function restingPlace({ machine, parts }, { tilt_deg: tilt = machine.tilt.zero_deg, turn_deg: turn = machine.turn.zero_deg } = {}) {
   const high = 30 + Math.max(60, ...parts.map((part) => (part.base ? length(part.base.centre_mm) + part.base.radius_mm : 0)));
   const origin = carried(chainOf(machine).table(tilt, turn), [0, 0, 0]);
@@ -76,7 +76,7 @@ function restingPlace({ machine, parts }, { tilt_deg: tilt = machine.tilt.zero_d
 export const PLAIN_TINT = [0, 0, 0, 0];
 const FAINT = { light: [0.84, 0.86, 0.88, 0.82], dark: [0.2, 0.22, 0.25, 0.85] };
 
-/** [{firstRow, endRow, first, end, tint}]: rows, their slots, and the colour that is mixed in (its alpha tells how much). */
+/** [{firstRow, endRow, first, end, tint}]: rows, their slots, and the colour that is mixed in (its alpha is the share). */
 export function drawnRanges({ rows, path }, scene) {
   const faint = FAINT[scene.dark ? "dark" : "light"], shown = Math.min(scene.row + 1, rows.count);
   const tintOf = (other) => (other && scene.others === "faint" ? faint : PLAIN_TINT);

@@ -1,4 +1,4 @@
-// Ways: where the tip goes while nothing is laid, and marks on the path for seams, retractions and primes.
+// Ways: paths of the tip without extrusion, and marks on the path for seams, retractions and primes.
 
 import { cornersOn, programOf } from "../picture/gl.js";
 import { clamp, countUpTo, length, mix, sub } from "../picture/math.js";
@@ -9,9 +9,9 @@ const PLAIN_WAY = [76, 126, 196, 200];
 const WAYS = { [KIND.rotate]: [224, 122, 32, 235], [KIND.wipe]: [140, 112, 190, 200] };
 const TURN_STEP_DEG = 3;
 
-/** Drawing, for ranges of rows, of the ways of all that move and lay nothing; turns of the table are arcs. */
+/** Drawing of travel paths for ranges of rows; turns of the table are arcs. */
 export function waysOn(gl, { rows, path, chain }) {
-  const places = [], colours = [], row = [], p = path.points; // row: of each pair of places, rising
+  const places = [], colours = [], row = [], p = path.points; // row: of each pair of points, rising
   for (let i = 0; i < rows.count; i++) {
     if (rows.kind[i] === KIND.extrude) continue;
     const s = 3 * path.slot(i), first = [p[s], p[s + 1], p[s + 2]], end = [p[s + 3], p[s + 4], p[s + 5]];
@@ -28,7 +28,7 @@ export function waysOn(gl, { rows, path, chain }) {
   return { draw: (seen, firstRow, endRow) => lines.draw(seen, { range: [firstRow, endRow].map((edge) => 2 * countUpTo(row, edge - 1)) }) };
 }
 
-/** The tip's places on the work while the table turns. */
+/** Positions of the tip on the work while the table turns. */
 function arcOf(rows, i, chain) {
   const place = workpieceOf(chain), from = placeAt(rows, i, 0), to = placeAt(rows, i, 1);
   const steps = clamp(Math.ceil(Math.max(Math.abs(to[3] - from[3]), Math.abs(to[4] - from[4])) / TURN_STEP_DEG), 1, 360);
@@ -72,7 +72,7 @@ export const MARKS = {
   primes: { fill: [0.34, 0.71, 0.91], shape: 2, larger: 2 },
 };
 
-/** Marks of one kind at the beginnings of rows. */
+/** Marks of one kind at the starts of rows. */
 export function marksOn(gl, marked, path, { fill, shape, larger = 0 }) {
   const places = new Float32Array(3 * marked.length);
   marked.forEach((row, k) => places.set(path.points.subarray(3 * path.slot(row), 3 * path.slot(row) + 3), 3 * k));

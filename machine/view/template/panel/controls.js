@@ -1,4 +1,4 @@
-// Controls: what is coloured how, what is shown and what is not; the legend; dark and light.
+// Controls: colouring, visibility, the legend, and the theme.
 
 import { $, duration, keptIn, listen, made, numberIn, optionsOf, partsInWords, swatch, swatches, tabsOf, tell, toggle } from "../elements.js";
 import { RAMP, typeColour } from "../moves/colours.js";
@@ -8,7 +8,7 @@ import { hex, sectionAsked } from "../picture/shapes.js";
 
 export function controlsOf(print, scene, bells) {
   const { rows, header: { parts } } = print, kept = keptIn("localStorage", "colour by", { mode: scene.mode }), posed = parts.filter((part) => part.base);
-  if ([...$("colour-by").options].some(({ value }) => value === kept.now.mode)) scene.mode = kept.now.mode; // of the print before
+  if ([...$("colour-by").options].some(({ value }) => value === kept.now.mode)) scene.mode = kept.now.mode; // kept from the previous print
   for (const name of Object.keys(scene.on)) {
     const box = $(`show-${name}`);
     box.checked = scene.on[name];
@@ -72,7 +72,7 @@ function kindEntries(rows) {
 
 const KINDS = ["travel", "", "retraction", "turning the table", "wipe", "prime"];
 
-/** Position and values of the print after the row that is shown, as in the file. */
+/** Position and values of the print after the displayed row, as in the file. */
 export function readoutsOf(print, scene, bells) {
   const { rows, header, flow } = print;
   const axis = (k, digits) => () => scene.place[k].toFixed(digits);

@@ -1,4 +1,4 @@
-// Outside: with whom the page talks: the workbench's page in which it may lie, and the server of a running print.
+// Outside: communication with the workbench's page that may contain this one, and with the server of a running print.
 
 import { $, hide, listen, onData, tell, toggle } from "../elements.js";
 
@@ -30,7 +30,7 @@ export function outsideOf({ scene, findings, code, chooseTheme, camera, bells })
 const ASK_EVERY_MS = 1000;
 const NOT_ARRIVED = "that has not arrived: use the terminal, or the printer's own switch";
 
-/** Follows a running print, asking the computer that served the page for what the printer has acknowledged. */
+/** Follow a running print, polling the computer that served the page for what the printer has acknowledged. */
 export function follow(scene, player) {
   hide({ live: false });
   orders();
@@ -51,7 +51,7 @@ export function follow(scene, player) {
   ask();
 }
 
-/** The buttons, which do what keys in the terminal do; a cancel is confirmed in a popover, an emergency stop is not. */
+/** Buttons with the actions of the keys in the terminal; a cancel is confirmed in a popover, an emergency stop is not. */
 function orders() {
   onData("order", async ({ order }) => {
     const answer = await fetch(`order/${order}`, { method: "POST" }).catch(() => null);

@@ -1,11 +1,11 @@
-// Report: the front of decompositions, figures and tables beside the picture, findings in a list and over it, and the picture that is printed.
+// Report: the front of decompositions, figures and tables beside the picture, findings in a list and over it, and the picture for printing.
 
 import { $, button, findingButton, hide, listen, made, putAt, putTable, rowOf, termsOf } from "../elements.js";
 import { standing } from "../moves/picture.js";
 import { carried, projected } from "../picture/math.js";
 import { MOST_CUTS } from "../picture/shapes.js";
 
-/** The best decomposition for every number of parts: its figures, and how another one than the taken would cut the model. */
+/** The best decomposition for every number of parts: its figures, and how another one than the selected would cut the model. */
 export function frontOf(print, scene) {
   const { front } = print.header;
   if (front.length < 2) return;
@@ -32,7 +32,7 @@ function lineOf(row, idle, choose) {
   return line;
 }
 
-/** What to know of the row that is looked at. */
+/** Why a row was chosen, or the command that chooses it. */
 function showChoice(row, drawn) {
   const told = !row ? ["Cut by a plan: none of these rows."] : row.chosen ? [`✓ chosen ${row.why}.`]
     : [drawn ? "This is how it would be cut; " : "It was not made; ", made("code", { text: row.command }), " takes it, and ", made("code", { text: "--parts", className: "whole" }), " goes with every other command too."];
@@ -62,7 +62,7 @@ const APART_PX = 30; // findings nearer to each other share a marker
 const CELL_PX = APART_PX / Math.SQRT2; // no two markers lie in one cell
 const AROUND = [-2, -1, 0, 1, 2];
 
-/** What the dry run complains about: a list, and markers over the picture, one for all that lie together; a click goes there. */
+/** Findings of the dry run: a list, and markers over the picture, one for each group of near ones; a click goes there. */
 export function findingsOf(print, scene, bells, camera, player) {
   const { findings } = print.header, placed = findings.flatMap((finding, k) => (finding.row >= 0 && finding.workpiece_mm ? [k] : []));
   let chosen = -1;
@@ -83,7 +83,7 @@ export function findingsOf(print, scene, bells, camera, player) {
     if (findings[k].row >= 0) choose(k);
     items[k].scrollIntoView({ block: "nearest" });
   };
-  /** The next of those under a marker, from its first on. */
+  /** Go to the next finding of a marker, beginning with its first. */
   const press = ({ members }) => {
     open(members[(members.indexOf(chosen) + 1) % members.length]);
   };
@@ -96,7 +96,7 @@ export function findingsOf(print, scene, bells, camera, player) {
   return { showMarkers, open: (k) => { if (items[k]) open(k); } };
 }
 
-/** [{x, y, members: places in the list}] of the findings in the picture; x, y: pixels of the first of each group. */
+/** [{x, y, members: indices into the list}] of the findings in the picture; x, y: pixels of the first of each group. */
 function groupsOf(findings, placed, toClip, { clientWidth: width, clientHeight: height }) {
   const groups = [], cells = new Map(), cell = (i, j) => i + 4096 * j;
   for (const k of placed) {
@@ -114,7 +114,7 @@ function groupsOf(findings, placed, toClip, { clientWidth: width, clientHeight: 
   return groups;
 }
 
-/** A function that shows groups as buttons, as many as there are. */
+/** A function that shows groups as buttons, one for each. */
 function markersOf(press) {
   const markers = [];
   return (groups, findings, chosen) => {

@@ -1,4 +1,4 @@
-// Sliders: the one over the whole print, with playing and keys, and the two that limit the layers, with a bar for the time of every layer.
+// Sliders: the one over the whole print, with playback and keys, and the two that limit the layers, with a bar for the time of every layer.
 
 import { $, duration, hide, listen, nextFrame, numberIn, onKeys, optionsOf, tell } from "../elements.js";
 import { viewKeys } from "../picture/camera.js";
@@ -8,7 +8,7 @@ import { clamp } from "../picture/math.js";
 const PLAYING = [1, 5, 20, 100, 300, 1000];
 const USUAL = 100;
 
-/** {stop, toggle, playing, go(row), step(rows)}: the latter two stop the playing. */
+/** {stop, toggle, playing, go(row), step(rows)}: the latter two stop playback. */
 export function courseOf(print, scene, bells) {
   const { rows, header } = print, position = $("position"), total = rows.count ? rows.time[rows.count - 1] / 1000 : 0;
   position.max = Math.max(rows.count - 1, 0);
@@ -59,7 +59,7 @@ function playerOf(scene, bells, total) {
   return player;
 }
 
-/** Each part's rows as a piece of its colour. */
+/** Each part's rows as a piece in its colour. */
 function paintStrip(strip, parts, count) {
   const share = (row) => `${((100 * row) / Math.max(count, 1)).toFixed(3)}%`;
   const pieces = parts.filter((part) => part.rows).flatMap(({ colour, first_row: first, rows }) => [
@@ -116,15 +116,15 @@ export function layerSliders({ header: { parts } }, scene, bells) {
 
 const layerInWords = (layer) => `${layer.part ? `part ${layer.part}, ` : ""}layer ${layer.number}, ${layer.z.toFixed(2)} mm, takes ${duration(layer.time)}`;
 
-/** The place of the layer that comes nearest to a value, among those of the same part as the layer at a place. */
+/** The index of the layer nearest to a value, among those of the same part as the layer at an index. */
 function nearestLayer(layers, place, value, of) {
   const { part } = layers[place], off = (k) => Math.abs(of(layers[k]) - value);
   return layers.reduce((best, layer, k) => (layer.part === part && off(k) < off(best) ? k : best), place);
 }
 
-const THUMB_PX = 13; // of the slider: half of it lies beyond its first and last place
+const THUMB_PX = 13; // of the slider's thumb: half of it is beyond its first and last position
 
-/** A bar for every layer beside the slider of the layers, as long as the layer takes; a click goes to the layer. */
+/** A bar for every layer beside the slider of the layers, as long as the layer's time; a click goes to the layer. */
 export function layerTimes(scene, bells) {
   const canvas = $("layer-times"), pen = canvas.getContext("2d");
   const draw = () => {
@@ -133,7 +133,7 @@ export function layerTimes(scene, bells) {
     if (!width || !height) return;
     [canvas.width, canvas.height] = [width, height];
     const style = getComputedStyle(canvas), [shown, others] = ["--accent", "--soft"].map((name) => style.getPropertyValue(name));
-    const times = Float32Array.from(layers, ({ time }) => time).sort(), usual = times[Math.ceil(0.98 * (times.length - 1))] || 1; // the longest would leave the others no length
+    const times = Float32Array.from(layers, ({ time }) => time).sort(), usual = times[Math.ceil(0.98 * (times.length - 1))] || 1; // the longest would leave no length for the others
     const lines = longestAt(layers, (k) => Math.floor(height - (THUMB_PX / 2 + (k / Math.max(layers.length - 1, 1)) * (height / dense - THUMB_PX)) * dense));
     const pitch = (height - THUMB_PX * dense) / Math.max(layers.length - 1, 1), thick = pitch < 3 ? Math.ceil(pitch) : Math.floor(pitch) - 1;
     for (const [y, k] of lines) {
@@ -161,7 +161,7 @@ export function layerTimes(scene, bells) {
   new ResizeObserver(draw).observe(canvas);
 }
 
-/** Of the layers that share a line of pixels, the one that takes longest: line of pixels to place. */
+/** For each line of pixels, the index of its slowest layer. */
 function longestAt(layers, lineOf) {
   const longest = new Map();
   layers.forEach(({ time }, k) => {

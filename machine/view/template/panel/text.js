@@ -1,4 +1,4 @@
-// Lines: the text of the G-code out of the page's own rows: patterns whose holes the numbers of a line's move fill (CONTRIBUTING.md has their format).
+// Lines: the text of the G-code from the page's own rows: patterns whose gaps the numbers of a line's move fill (CONTRIBUTING.md has their format).
 
 import { $, listen, made, nextFrame, tell, toggle } from "../elements.js";
 import { clamp, countUpTo } from "../picture/math.js";
@@ -6,7 +6,7 @@ import { clamp, countUpTo } from "../picture/math.js";
 const HOLE = /([A-Z])([\u0001-\u0006])/g;
 const FORMS = [(number) => number, (number) => number.replace(/\.?0+$/, ""), (number) => number.replace(/\.?0+$/, "").replace("0.", ".")];
 
-/** {count, line(k)} as linesOfFile gives it; null where the text is not in the page. */
+/** {count, line(k)} as from linesOfFile; null where the text is not in the page. */
 export function linesOfRows({ header, rows, patternOf }) {
   if (!header.text) return null;
   const { patterns, zeros } = header.text, from = zeros.map(([line]) => line);
@@ -19,16 +19,16 @@ export function linesOfRows({ header, rows, patternOf }) {
   return { count: patternOf.length, line };
 }
 
-/** A whole number with so many of its digits behind the point. */
+/** An integer written with a number of its digits behind the point. */
 function decimal(value, digits) {
   const figures = String(Math.abs(value)).padStart(digits + 1, "0");
   return `${value < 0 ? "-" : ""}${figures.slice(0, -digits)}.${figures.slice(-digits)}`;
 }
 
 const LINE_PX = 18;
-const MOST_PX = 8e6; // higher boxes are cut off by browsers: of longer files a scroll goes further
+const MOST_PX = 8e6; // browsers cut off higher boxes: a scroll moves further in longer files
 
-/** {count, line(k)}: the lines of a file, from 1 as the readouts count them. */
+/** {count, line(k)}: the lines of a file, counted from 1 as in the readouts. */
 async function linesOfFile(file) {
   const bytes = new Uint8Array(await file.arrayBuffer()), starts = [0], decoder = new TextDecoder();
   for (let at = bytes.indexOf(10); at >= 0; at = bytes.indexOf(10, at + 1)) starts.push(at + 1);
@@ -36,7 +36,7 @@ async function linesOfFile(file) {
   return { count: starts.length - 1, line: (k) => decoder.decode(bytes.subarray(starts[k - 1], starts[k] - 1)).trimEnd() };
 }
 
-/** {take(file), go(line), needed()}: the text that is in the page, else that of a file. */
+/** {take(file), go(line), needed()}: the text in the page, otherwise that of a file. */
 export function textOf(print, scene, bells, player) {
   const { rows, header } = print, pane = $("code-lines"), room = $("code-room");
   let text = linesOfRows(print), asked = { row: -1, line: 0 };
@@ -60,7 +60,7 @@ export function textOf(print, scene, bells, player) {
     $("code-line").value = marked;
   };
   const ask = nextFrame(draw);
-  /** Brings the marked line into view, where it is not. */
+  /** Scroll the marked line into view if it is not visible. */
   const follow = () => {
     if (!text || !pane.clientHeight) return;
     const line = now(), top = first();

@@ -1,12 +1,12 @@
-// Camera: an eye that circles a target, z up, moved by mouse, fingers and keys.
+// Camera: orbits a target, z up, moved by mouse, fingers and keys.
 
 import { onData } from "../elements.js";
 import { add, bounds, clamp, cross, dot, length, moved, multiply, perspective, RAD, scaled, sub } from "./math.js";
 
-const FARTHEST_MM = 1000; // behind the work: room for the machine
-const STILL_PIXELS = 4; // a hand that moves less only clicks
+const FARTHEST_MM = 1000; // depth behind the work: room for the machine
+const STILL_PIXELS = 4; // a pointer that moves less only clicks
 const MARGIN = 1.12;
-export const HALF_HEIGHT = Math.tan(15 * RAD); // of the picture at distance 1
+export const HALF_HEIGHT = Math.tan(15 * RAD); // half height of the picture at distance 1
 
 export function cameraOf() {
   const camera = { target: [0, 0, 0], distance: 300, yaw: -55 * RAD, pitch: 24 * RAD, radius: 100 };
@@ -17,7 +17,7 @@ export function cameraOf() {
   camera.eye = () => add(camera.target, scaled(outward(), camera.distance));
   camera.right = () => [-Math.sin(camera.yaw), Math.cos(camera.yaw), 0];
   camera.up = () => cross(outward(), camera.right());
-  /** How the eye sees what a matrix puts somewhere, {toEye, toClip}, in a picture of a size. */
+  /** The view of bodies placed by a matrix, {toEye, toClip}, in a picture of a given size. */
   camera.seen = ([width, height]) => {
     const { distance, radius } = camera, far = distance + Math.max(8 * radius, FARTHEST_MM);
     const [r, u, o] = [camera.right(), camera.up(), outward()], turn = [r[0], u[0], o[0], 0, r[1], u[1], o[1], 0, r[2], u[2], o[2], 0, 0, 0, 0, 1];
@@ -27,7 +27,7 @@ export function cameraOf() {
       return { toEye, toClip: multiply(lens, toEye) };
     };
   };
-  /** From where and along what a place of the picture is seen, as placeOn gives it. */
+  /** The ray of a point of the picture, given as by placeOn. */
   camera.sight = ([x, y]) => {
     const across = add(scaled(camera.right(), x), scaled(camera.up(), y));
     return [camera.eye(), add(scaled(outward(), -1), scaled(across, HALF_HEIGHT))];
@@ -36,20 +36,20 @@ export function cameraOf() {
     camera.yaw -= dx;
     camera.pitch = clamp(camera.pitch + dy, -89.5 * RAD, 89.5 * RAD);
   };
-  /** Looks from a side, yaw and pitch in degrees. */
+  /** Look from a side, yaw and pitch in degrees. */
   camera.lookFrom = (yaw, pitch) => Object.assign(camera, { yaw: yaw * RAD, pitch: pitch * RAD });
-  /** Shifts the target across the view; dx, dy in picture heights. */
+  /** Shift the target across the view; dx, dy in picture heights. */
   camera.pan = (dx, dy) => {
     const span = 2 * HALF_HEIGHT * camera.distance;
     camera.target = add(camera.target, add(scaled(camera.right(), -dx * span), scaled(camera.up(), dy * span)));
   };
-  /** Comes nearer by a factor towards a place of the picture (-1..1, y times the aspect). */
+  /** Zoom by a factor towards a point of the picture (-1..1, y times the aspect). */
   camera.zoom = (factor, x = 0, y = 0) => {
     const next = clamp(camera.distance * factor, 0.5, 40 * camera.radius), span = HALF_HEIGHT * (camera.distance - next);
     camera.target = add(camera.target, add(scaled(camera.right(), x * span), scaled(camera.up(), y * span)));
     camera.distance = next;
   };
-  /** Brings places into view about their middle, in a picture of a size. */
+  /** Fit the view to points, centred on them, in a picture of a given size. */
   camera.fit = (places, [width, height]) => {
     const [least, most] = bounds(places.flat());
     camera.target = scaled(add(least, most), 0.5);
@@ -67,7 +67,7 @@ export function cameraOf() {
 export const CORNERS = [-55, 55, -125, 125];
 const VIEWS = { front: [-90, 0], side: [0, 0], top: [-90, 89.5] };
 
-/** The buttons that look from a side, or a corner, degrees; from that at first. */
+/** The buttons that look from a side or a corner, and the first view, degrees. */
 export function viewButtons(camera, corner, changed) {
   const look = ({ view }) => {
     camera.lookFrom(...(VIEWS[view] || [corner, 24]));
@@ -77,7 +77,7 @@ export function viewButtons(camera, corner, changed) {
   look({});
 }
 
-/** Where on the canvas an event is: -1..1 upwards, and as far across as the canvas is wider than high. */
+/** The position of an event on the canvas: -1..1 upwards, and across by the aspect ratio. */
 export function placeOn(canvas, { clientX, clientY }) {
   const { left, top, width, height } = canvas.getBoundingClientRect();
   return [((clientX - left) / width * 2 - 1) * (width / height), 1 - ((clientY - top) / height) * 2];
@@ -134,7 +134,7 @@ export function handle(canvas, camera, { changed, pressed, asked = () => {}, tak
   }, { passive: false });
 }
 
-/** What turns, shifts and zooms the view, and looks from a side. */
+/** Controls that turn, shift and zoom the view, and look from a side. */
 export function viewKeys(camera, look) {
   const turn = 6 * RAD, shift = 0.05, views = ["corner", "front", "side", "top"];
   const arrow = (x, y) => (event) => {

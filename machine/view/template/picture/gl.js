@@ -1,4 +1,4 @@
-// GL: programs, buffers, frames that are drawn before they are shown, and the light that all drawing shares.
+// GL: programs, buffers, frames that are drawn before they are shown, and the lighting that all drawings share.
 
 import { notice } from "../elements.js";
 
@@ -10,20 +10,20 @@ vec3 lit(vec3 colour, vec3 n) {
   return colour * (0.42 + 0.58 * key + 0.24 * fill) + vec3(0.07 * gloss);
 }`;
 
-const CARD = { alpha: true, antialias: false, depth: false, powerPreference: "high-performance" }; // frames have what it lacks
+const CARD = { alpha: true, antialias: false, depth: false, powerPreference: "high-performance" }; // frames provide what is disabled here
 
-/** The WebGL2 of a canvas, null where there is none. */
+/** The WebGL2 context of a canvas, null where there is none. */
 export const cardOf = (canvas) => canvas.getContext("webgl2", CARD);
 
 export const density = () => Math.min(devicePixelRatio || 1, 2);
 
-/** Width and height of a picture, pixels, that takes a share of those of its canvas. */
+/** Width and height of a picture, in pixels, as a share of its canvas. */
 export const sizeOf = ({ clientWidth, clientHeight }, share = 1) => [clientWidth, clientHeight].map((x) => Math.max(Math.round(x * density() * share), 1));
 
-/** Whether a canvas has not the pixels that it should have. */
+/** Whether a canvas lacks the pixels that it should have. */
 export const outgrown = (canvas) => sizeOf(canvas).some((x, k) => x !== [canvas.width, canvas.height][k]);
 
-const PROGRAMS = new WeakMap(); // of each card: a program is made once, however many things are drawn with it
+const PROGRAMS = new WeakMap(); // by context: a program is compiled once, however often it is used
 
 export function programOf(gl, vertex, fragment) {
   if (!PROGRAMS.has(gl)) PROGRAMS.set(gl, new Map());
@@ -32,7 +32,7 @@ export function programOf(gl, vertex, fragment) {
   return made.get(name);
 }
 
-/** A program {use, set: values of uniforms by their names, at: place of an attribute}; the card compiles it while the page goes on. */
+/** A program {use, set: values of uniforms by their names, at: location of an attribute}; the card compiles it while the page continues. */
 function linked(gl, vertex, fragment) {
   const program = gl.createProgram();
   const shaders = [[gl.VERTEX_SHADER, vertex], [gl.FRAGMENT_SHADER, fragment]].map(([kind, text]) => {
@@ -44,7 +44,7 @@ function linked(gl, vertex, fragment) {
   });
   gl.linkProgram(program);
   let setters = null;
-  /** Raises what the compiler says, asked when the program is first needed: to ask sooner is to wait. */
+  /** Throw the compiler's errors when the program is first used: an earlier query would wait. */
   const ready = () => {
     if (!setters && !gl.getProgramParameter(program, gl.LINK_STATUS) && !gl.isContextLost())
       throw new Error(shaders.map((shader) => gl.getShaderInfoLog(shader)).join("") || gl.getProgramInfoLog(program));
@@ -55,9 +55,9 @@ function linked(gl, vertex, fragment) {
   return { use: () => gl.useProgram(ready()), set, at: (name) => gl.getAttribLocation(ready(), name) };
 }
 
-/** What gives each uniform of a program its value, by the type that it has there. */
+/** Setters of a program's uniforms, by their types in the program. */
 function settersOf(gl, program) {
-  const calls = { [gl.FLOAT]: "uniform1f", [gl.FLOAT_VEC3]: "uniform3fv", [gl.FLOAT_VEC4]: "uniform4fv" }; // else whole numbers
+  const calls = { [gl.FLOAT]: "uniform1f", [gl.FLOAT_VEC3]: "uniform3fv", [gl.FLOAT_VEC4]: "uniform4fv" }; // other types are integers
   const count = gl.getProgramParameter(program, gl.ACTIVE_UNIFORMS) || 0;
   return Object.fromEntries(Array.from({ length: count }, (_, k) => {
     const { name, type } = gl.getActiveUniform(program, k), place = gl.getUniformLocation(program, name), call = calls[type] || "uniform1i";
@@ -94,7 +94,7 @@ export function cornersOn(gl, program, attributes, indices = null) {
     gl.bindBuffer(gl.ARRAY_BUFFER, buffers[name]);
     gl.bufferSubData(gl.ARRAY_BUFFER, 0, content);
   };
-  /** Gives the card's memory back at once: a page that is open all day would wait for the collector. */
+  /** Free the card's memory at once, since a page that is open all day would wait for the garbage collector. */
   const free = () => {
     gl.deleteVertexArray(array);
     Object.values(buffers).forEach((buffer) => gl.deleteBuffer(buffer));
@@ -102,7 +102,7 @@ export function cornersOn(gl, program, attributes, indices = null) {
   return { draw, put, free };
 }
 
-/** The picture is built now and again whenever the card, which may take its memory back at any time, gives it again. */
+/** Build the picture now, and again when the context is restored: the card may take its memory back at any time. */
 export function outlive(gl, drop, build) {
   gl.canvas.addEventListener("webglcontextlost", (event) => {
     event.preventDefault();
@@ -121,7 +121,7 @@ export function outlive(gl, drop, build) {
   begin();
 }
 
-/** Where a picture is drawn before it is shown, so that it may take its time while the last one stays: {begin(width, height), bind, show, free}. */
+/** A framebuffer in which a picture is drawn before it is shown, so that the last one stays visible meanwhile: {begin(width, height), bind, show, free}. */
 export function frameOf(gl, samples) {
   const frame = gl.createFramebuffer(), colour = gl.createRenderbuffer(), depth = gl.createRenderbuffer();
   let width = 0, height = 0;

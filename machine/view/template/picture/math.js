@@ -1,4 +1,4 @@
-// Math: vectors of three numbers and 4 x 4 matrices, column by column as WebGL takes them.
+// Math: vectors of three numbers and 4 x 4 matrices in column-major order, as WebGL takes them.
 
 export const RAD = Math.PI / 180;
 export const clamp = (x, least, most) => Math.min(Math.max(x, least), most);
@@ -31,7 +31,7 @@ export function rotated(axis, angle) {
   ];
 }
 
-/** The inverse of a rotation with a shift. */
+/** The inverse of a rotation with a translation. */
 export function undone(m) {
   const back = [m[0], m[4], m[8], 0, m[1], m[5], m[9], 0, m[2], m[6], m[10], 0, 0, 0, 0, 1];
   return [...back.slice(0, 12), ...scaled(turned(back, m.slice(12, 15)), -1), 1];
@@ -44,7 +44,7 @@ export const turned = (m, v) => [
 ];
 export const carried = (m, v) => add(turned(m, v), [m[12], m[13], m[14]]);
 
-/** A place on the screen, each coordinate -1..1, and its distance w; w <= 0 lies behind the eye. */
+/** A point on the screen, each coordinate -1..1, and its distance w; w <= 0 is behind the camera. */
 export function projected(m, v) {
   const w = m[3] * v[0] + m[7] * v[1] + m[11] * v[2] + m[15], p = carried(m, v);
   return [p[0] / w, p[1] / w, p[2] / w, w];
@@ -55,7 +55,7 @@ export function perspective(height, aspect, near, far) {
   return [f / aspect, 0, 0, 0, 0, f, 0, 0, 0, 0, (far + near) / (near - far), -1, 0, 0, (2 * far * near) / (near - far), 0];
 }
 
-/** Least and greatest corner of points x, y, z after each other, of those that count by their place; [] where there are none. */
+/** Least and greatest corner of consecutive points x, y, z, of those selected by index; [] where there are none. */
 export function bounds(points, counts = null) {
   const least = [Infinity, Infinity, Infinity], most = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < points.length; i += 3) {
@@ -69,10 +69,10 @@ export function bounds(points, counts = null) {
   return least[0] <= most[0] ? [least, most] : [];
 }
 
-/** The eight corners of a box [least, most]; the bits of a corner's place tell at which end of each axis it lies. */
+/** The eight corners of a box [least, most]; each bit of a corner's index is the end of one axis. */
 export const cornersOf = (box) => Array.from({ length: 8 }, (_, k) => [0, 1, 2].map((axis) => box[(k >> axis) & 1][axis]));
 
-/** How many of the rising numbers are at most x. */
+/** The number of rising values that are at most x. */
 export function countUpTo(rising, x) {
   let low = 0, high = rising.length;
   while (low < high) {

@@ -9,10 +9,10 @@ export const hex = (colour) => "#" + colour.map((x) => Math.round(x).toString(16
 export const PLAIN = "#9aa0a8";
 export const RED = [213, 32, 40];
 
-/** A colour as one number, as it stands in an array of bytes. */
+/** A colour as one number, as stored in an array of bytes. */
 export const wordOf = ([r, g, b], a = 255) => (a << 24 | Math.round(b) << 16 | Math.round(g) << 8 | Math.round(r)) >>> 0;
 
-export const MOST_CUTS = 64; // as many fit into every graphics card's uniforms
+export const MOST_CUTS = 64; // this number fits into every graphics card's uniforms
 
 export const SOLID_VERTEX = `
 in vec3 place;
@@ -32,13 +32,13 @@ void main() {
 export const SOLID_FRAGMENT = `
 in vec3 seen, spot;
 in vec4 paint;
-uniform int cuts; // at least 0: faces have the hues of the parts that so many planes would cut, in print order; -1: their own
+uniform int cuts; // at least 0: faces have the hues of the parts that this number of planes would cut, in print order; -1: their own
 uniform vec4 planes[${MOST_CUTS}];
 uniform vec3 hues[${MOST_CUTS} + 1];
-uniform float ghost; // 0: whole; else how much of a ghost is seen face on
+uniform float ghost; // 0: opaque; otherwise opacity of a ghost, face on
 uniform float strength;
-uniform bool plain, capped; // lines, which have no light of their own; backs seen through a section are flat
-uniform vec4 clip; // in the eye's frame: what lies above this plane is away
+uniform bool plain, capped; // lines are unlit; backs seen through a section are flat
+uniform vec4 clip; // in the camera's frame: anything above this plane is removed
 out vec4 colour;
 ${LIGHT}
 vec3 divided() {
@@ -46,7 +46,7 @@ vec3 divided() {
   bool seam = false;
   for (int k = 0; k < cuts; k++) {
     float height = dot(planes[k].xyz, spot) - planes[k].w, width = 2.5 * fwidth(height);
-    if (height > 0.0) { hue = hues[k + 1]; seam = height < width; } // drawn on the upper part: what a plane only touches has none
+    if (height > 0.0) { hue = hues[k + 1]; seam = height < width; } // drawn on the upper part: a plane that only touches the model has none
   }
   return seam ? vec3(0.07, 0.08, 0.1) : hue;
 }
@@ -68,13 +68,13 @@ void main() {
 
 const UNCUT = [0, 0, 0, 1];
 
-/** How a plane {normal, offset_mm} cuts what is drawn, as solids and beads take it: in the eye's frame. */
+/** How a plane {normal, offset_mm} cuts the drawings of solids and beads: in the camera's frame. */
 export function clipOf(toEye, plane) {
   const normal = plane && turned(toEye, plane.normal);
   return { clip: plane ? [...normal, plane.offset_mm + dot(normal, toEye.slice(12, 15))] : UNCUT };
 }
 
-/** Drawing for triangles {places, colours}, or a range of their corners. lift: in depth, towards the eye; clip: a plane of the eye's frame that cuts a closed (capped) or an open surface. */
+/** Drawing for triangles {places, colours}, or a range of their corners. lift: depth offset towards the camera; clip: a plane in the camera's frame that cuts a closed (capped) or an open surface. */
 export function solidOf(gl, { places, colours }, mode = gl.TRIANGLES) {
   const shape = cornersOn(gl, programOf(gl, SOLID_VERTEX, SOLID_FRAGMENT), { place: [places, 3], colour: [colours, 4] }), corners = places.length / 3;
   const draw = ({ toClip, toEye }, { ghost = 0, strength = 1, lift = 0, cuts = null, clip = UNCUT, capped = false, range: [first, end] = [0, corners] } = {}) => {
@@ -95,10 +95,10 @@ export function solidOf(gl, { places, colours }, mode = gl.TRIANGLES) {
   return { draw, corners, paint: (painted) => shape.put("colour", painted), free: shape.free };
 }
 
-/** Drawing for pairs of places {places, colours}, all as bright. */
+/** Drawing for pairs of points {places, colours}, all equally bright. */
 export const linesOf = (gl, shape) => solidOf(gl, shape, gl.LINES);
 
-/** Drawing for a body {solid, lines}, of which either may be absent: its lines after its solid. over: before all else; more: see solidOf. */
+/** Drawing for a body {solid, lines}, of which either may be absent: its lines after its solid. over: in front of everything; more: see solidOf. */
 export function bodyOf(gl, shapes) {
   const solid = shapes.solid && solidOf(gl, shapes.solid), lines = shapes.lines && linesOf(gl, shapes.lines);
   const draw = (seen, { lift = 0, over = false, ...more } = {}) => {
@@ -110,7 +110,7 @@ export function bodyOf(gl, shapes) {
   return { draw, free: () => [solid, lines].forEach((drawing) => drawing?.free()) };
 }
 
-/** Corners of triangles put together, all of one colour a piece. */
+/** Combined corners of triangles, with one colour for each piece. */
 export function trianglesOf(pieces) {
   const places = [], colours = [];
   for (const { corners, colour } of pieces)
@@ -123,7 +123,7 @@ export function trianglesOf(pieces) {
 
 const quad = (a, b, c, d) => [a, b, c, a, c, d];
 
-const SIDES = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]; // of a box, by its corners
+const SIDES = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]; // sides of a box, by its corners
 
 export function boxCorners(least, most) {
   const corners = cornersOf([least, most]);
@@ -135,9 +135,9 @@ export function boxEdges(least, most) {
   return corners.flatMap((corner, k) => [1, 2, 4].filter((bit) => !(k & bit)).flatMap((bit) => [corner, corners[k | bit]]));
 }
 
-export const circle = (radius, z, steps) => ringOf([0, 0, z], [0, 0, 1], radius, steps, Math.PI / 2); // from x on
+export const circle = (radius, z, steps) => ringOf([0, 0, z], [0, 0, 1], radius, steps, Math.PI / 2); // starts at x
 
-/** The surface of an outline [radius, z] turned about z. */
+/** The surface of an outline [radius, z] revolved about z. */
 function revolved(outline, steps = 64) {
   const rings = outline.map(([radius, z]) => circle(radius, z, steps));
   return rings.slice(1).flatMap((ring, i) => ring.flatMap((_, k) => {
@@ -148,13 +148,13 @@ function revolved(outline, steps = 64) {
 
 export const chained = (points) => points.flatMap((point, k) => [point, points[(k + 1) % points.length]]);
 
-const HEAD_ABOVE_MM = 12; // how far the hot end is drawn above the last height that the profile tells
-const NOZZLE_MM = 6; // what lies within is drawn as the nozzle
+const HEAD_ABOVE_MM = 12; // height to which the hot end is drawn above the last height in the profile
+const NOZZLE_MM = 6; // bodies within this radius are drawn as the nozzle
 const ROUND = 96;
-export const ON_PLATE = 1e-5; // in depth, by which the plate's lines are seen before it
-export const FROM_BELOW = { strength: 0.18 }; // how the plate is drawn then, or it would hide everything
+export const ON_PLATE = 1e-5; // depth offset that shows the plate's lines before it
+export const FROM_BELOW = { strength: 0.18 }; // look of the plate from below, where it would hide everything
 
-/** Shapes of all that the machine is, {solid, lines} each, by name; hotEnd: of the head, above the nozzle. */
+/** Shapes of all bodies of the machine, {solid, lines} each, by name; hotEnd: the head above the nozzle. */
 export function bodiesOf(machine, dark) {
   const plate = dark ? [66, 72, 81, 255] : [232, 235, 239, 255], frame = dark ? [112, 121, 134, 255] : [190, 196, 205, 255];
   const line = dark ? [120, 128, 140, 110] : [120, 126, 136, 120], edge = dark ? [170, 178, 190, 190] : [70, 76, 86, 170];
@@ -165,7 +165,7 @@ export function bodiesOf(machine, dark) {
   };
 }
 
-/** Boxes, and what is drawn with them: solids, and lines. */
+/** Boxes and further shapes: solids, and lines. */
 export function boxesOf(boxes, colour, edge, solids = [], lines = []) {
   return {
     solid: trianglesOf([...solids, ...boxes.map((box) => ({ corners: boxCorners(box.min_mm, box.max_mm), colour }))]),
@@ -178,13 +178,13 @@ function plateCorners({ radius_mm: radius, size_mm: size, thickness_mm: thick })
   return revolved([[0, -thick], [radius, -thick], [radius, 0], [0, 0]], 96);
 }
 
-const GLYPHS = { // strokes of a letter: places on a grid of 2 by 4, two digits each
+const GLYPHS = { // strokes of a letter: points on a grid of 2 by 4, two digits each
   0: "0020240400", 1: "031410", 2: "042422020020", 3: "04242000 0222", 4: "040222 2420", 5: "240402222000", 6: "240400202202", 7: "042410", 8: "0020240400 0222",
   9: "002024040222", "-": "0222", F: "000424 0212", R: "000424220220", O: "0020240400", N: "00042024", T: "0424 1410", X: "0024 0420", Y: "041224 1210", m: "00021210 122220",
 };
-const ADVANCE = 0.75; // from one letter to the next, of their height
+const ADVANCE = 0.75; // distance between letters, as a share of their height
 
-/** The strokes of a word that lies at a height, its middle at x, y. */
+/** The strokes of a word at a height, its middle at x, y. */
 const written = (word, [x, y], high, z) => [...word].flatMap((letter, k) => (GLYPHS[letter]?.split(" ") || []).flatMap((stroke) => {
   const points = stroke.match(/../g).map(([u, v]) => [x + (ADVANCE * (k - word.length / 2) + (Number(u) + 0.5) / 4) * high, y + (v / 4 - 0.5) * high, z]);
   return points.slice(1).flatMap((point, n) => [points[n], point]);
@@ -228,7 +228,7 @@ export function headOf({ silhouette_mm: silhouette, boxes }, colour, edge) {
 
 const LEFT = { none: 0, printed: 1, straight: 2 };
 
-/** Corners of all faces and, a part each, which of them are its own. */
+/** Corners of all faces and, for each part, the faces that belong to it. */
 export function surfacesOf({ header, array }) {
   const vertices = array("vertices"), faces = array("faces"), [marks] = array("face_marks");
   if (!faces[0].length) return null;
@@ -242,7 +242,7 @@ export function surfacesOf({ header, array }) {
   return { ...surfaces, apart: apartOf(surfaces) };
 }
 
-/** Colours of all corners: red where a face is risky in the way asked for (none, printed, straight), else as inkOf(part) gives them for a face. */
+/** Colours of all corners: red where a face is risky in the selected way (none, printed, straight), otherwise as inkOf(part) returns for a face. */
 export function surfaceColours({ marks, parts }, inkOf, risky) {
   const words = new Uint32Array(3 * marks.length), red = wordOf(RED);
   for (const described of parts) {
@@ -277,7 +277,7 @@ export function cutsOf({ planes, colours }) {
   };
 }
 
-/** Which way each part goes when the model is drawn apart: along its direction, and with what it stands on. Part -> vector. */
+/** Shift of each part in the exploded view: along its direction, and with the part below it. Part -> vector. */
 function apartOf({ places, parts }) {
   const ways = new Map();
   parts.forEach(({ part }, k) => {
@@ -287,7 +287,7 @@ function apartOf({ places, parts }) {
   return ways;
 }
 
-/** The part whose surface comes nearest to a place. */
+/** The part whose surface is nearest to a point. */
 function nearest(places, parts, [x, y, z]) {
   let best = null, least = Infinity;
   for (const { part, range } of parts)
@@ -298,13 +298,13 @@ function nearest(places, parts, [x, y, z]) {
   return best;
 }
 
-/** Two vectors across a direction. */
+/** Two vectors perpendicular to a direction. */
 export function beside(direction) {
   const a = unit(cross(Math.abs(direction[2]) < 0.9 ? [0, 0, 1] : [1, 0, 0], direction));
   return [a, cross(direction, a)];
 }
 
-/** Places around a centre, across a direction, counter-clockwise seen against it; `from`: the angle of the first one. */
+/** Points around a centre, perpendicular to a direction, counter-clockwise seen against it; `from`: the angle of the first one. */
 export function ringOf(centre, direction, radius, steps, from = 0) {
   const [a, b] = beside(direction);
   return Array.from({ length: steps }, (_, k) => from + (2 * Math.PI * k) / steps).map((angle) => add(centre, add(scaled(a, radius * Math.cos(angle)), scaled(b, radius * Math.sin(angle)))));
@@ -312,7 +312,7 @@ export function ringOf(centre, direction, radius, steps, from = 0) {
 
 export const based = (parts) => parts.filter((part) => part.base && part.direction && part.base.radius_mm > 0);
 
-/** Discs where the parts are cut, their rims, and an arrow along each part's direction: as many corners a part. */
+/** Discs where the parts are cut, their rims, and an arrow along each part's direction: an equal number of corners for each part. */
 export function planesOf(parts, colourOf) {
   const discs = [], rims = [];
   for (const part of based(parts)) {

@@ -1,15 +1,15 @@
-// Connections to the server: states arrive, commands go out. A lost one is reported, and opened again.
-// A command is {do: NAME, its fields}; tests/machine/workbench/test_page_commands.py holds every one of the page against the server's:
+// Connections to the server: states arrive, commands are sent. A lost connection is reported and reopened.
+// A command is {do: NAME, its fields}; tests/machine/workbench/test_page_commands.py checks every one of the page against the server's:
 // send and ask: the bench's, FUNCTIONS in machine/workbench/session/commands.py; the state that answers: web/snapshot.py;
 // printsLine: the prints', COMMANDS in machine/workbench/printing/commands.py; the state: prints.snapshot() there;
-// the line in model/benches.js: the paired devices', DEVICE_COMMANDS in web/line.py. A button with data-do or data-print gives the NAME alone.
+// the line in model/benches.js: the paired devices', DEVICE_COMMANDS in web/line.py. A button with data-do or data-print gives only the NAME.
 
 import { made, notice } from "../../../view/template/elements.js";
 import { keptInTab } from "./store.js";
 
-export const AGAIN_MS = 1000, SAVED_MS = 6000; // until a line is tried again, and as long as a saved file is told
-const SILENT_MS = 1500, LATE_MS = 200; // without a beat, two a second; and until what has come is heard, where the page itself was busy
-const ENDINGS = { 4404: "closed", 4403: "unpaired" }; // by the code with which the server ends a line: its bench is closed, its device let go
+export const AGAIN_MS = 1000, SAVED_MS = 6000; // delay before reconnecting, and duration of the notice about a saved file
+const SILENT_MS = 1500, LATE_MS = 200; // time without a beat (two a second are sent), and until a received message is handled where the page itself was busy
+const ENDINGS = { 4404: "closed", 4403: "unpaired" }; // by the code with which the server closes a connection: its bench is closed, its device unpaired
 const NOT_SENT = "the line to tiltprint is lost, so this was not done";
 export const LINE_STATUS = {
   open: "",
@@ -47,24 +47,24 @@ export function lineAt(path, heard, stands) {
   return { isOpen: () => socket.readyState === WebSocket.OPEN && !silent, send: (command) => socket.send(JSON.stringify(command)) };
 }
 
-/** Why no line can be opened: nobody is there, or one that does not know the page's address, which has another token at each start, or its device. */
+/** Why no connection can be opened: no server answers, or it refuses this page's token, which changes at each start, or its device. */
 export const whyUnanswered = () => fetch("", { method: "HEAD", signal: AbortSignal.timeout(AGAIN_MS) }).then(
   ({ status }) => ({ 403: "unpaired", 404: "replaced" }[status] || "lost"), ({ name }) => (name === "TimeoutError" ? "lost" : "ended"));
 
-let line = null, asked = new Map(), count = Date.now(); // count: beyond that of the page before a reload; asked: what is called when a command is answered, by its name
+let line = null, asked = new Map(), count = Date.now(); // count: above that of the page before a reload; asked: callbacks by the name of their command
 const kept = keptInTab("page", { name: "" });
-/** This page's name, which no other one has, not even a copy of its tab: a reload alone hands it on, and with it the command of its prints. */
-export const OWN_PAGE = kept.now.name || crypto.getRandomValues(new Uint32Array(3)).join("-"); // a page that is not encrypted has no randomUUID
+/** This page's unique name, which no copy of its tab has: only a reload passes it on, and with it the control of its prints. */
+export const OWN_PAGE = kept.now.name || crypto.getRandomValues(new Uint32Array(3)).join("-"); // without HTTPS there is no randomUUID
 kept.keep({ name: "" });
 addEventListener("pagehide", () => kept.keep({ name: OWN_PAGE }));
 
-/** A state as this page tells it: what others were refused is theirs to see. */
+/** A state as this page shows it, without refusals of other pages. */
 function ownState(state) {
   const own = (told) => ([OWN_PAGE, ""].includes(told?.page) ? told : null);
   return { ...state, problem: state.problems[OWN_PAGE] || state.problems[""] || "", refused: own(state.refused), units: own(state.units) };
 }
 
-/** The page's line to its bench: follow(state) is called with every new state, stands(how) with a word of LINE_STATUS. */
+/** The page's connection to its bench: follow(state) is called with every new state, stands(how) with a key of LINE_STATUS. */
 export function openLine(follow, stands) {
   const heard = (state) => {
     follow(ownState(state));
@@ -77,10 +77,10 @@ export function openLine(follow, stands) {
   line = lineAt("line?beats", heard, stands);
 }
 
-/** A command; what becomes of it is seen by the next states. */
+/** Send a command; the next states show its effect. */
 export const send = (command) => { if (line?.isOpen()) line.send({ ...command, page: OWN_PAGE }); };
 
-/** The same; answered(refusal) is called after the state by which it is done ("") or refused. */
+/** Send a command; answered(refusal) is called after the state in which it is done ("") or refused. */
 export function ask(command, answered) {
   if (!line?.isOpen()) return answered(NOT_SENT);
   const name = `${OWN_PAGE} ${++count}`;
@@ -88,7 +88,7 @@ export function ask(command, answered) {
   send({ ...command, ask: name });
 }
 
-/** A function of a key and its address that passes what it fetches to take(), the latest request only; null for nothing. insists: retry what is missing, as after a lost connection; begin(): called before a request. */
+/** A function of a key and its address that passes the fetched content to take(), for the latest request only; null if the key is empty. insists: retry missing content, as after a lost connection; begin(): called before a request. */
 export function newest({ read, take, insists = false, begin = () => {} }) {
   let asked = "";
   return async (key, address) => {
@@ -102,7 +102,7 @@ export function newest({ read, take, insists = false, begin = () => {} }) {
   };
 }
 
-/** Has the browser save what the server makes at an address. */
+/** Let the browser save the file that the server creates at an address. */
 export async function save(address) {
   const answer = await fetch(address);
   if (!answer.ok) return;
@@ -114,10 +114,10 @@ export async function save(address) {
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
 }
 
-export const ANSWER_MS = 3000; // within which the workbench answers, and a printer has confirmed an emergency stop
-const OWED_MS = 10000; // so long an emergency stop waits for a line: after that its person has done something else
+export const ANSWER_MS = 3000; // time in which the workbench answers and a printer confirms an emergency stop
+const OWED_MS = 10000; // time for which an emergency stop waits for a connection: later the user has taken other action
 
-/** The connection to the prints. The page's name keeps its control of them after a reconnection. An emergency stop without a connection is sent once there is one, if that is soon and its print still exists, else expired() is called. */
+/** The connection to the prints. The page's name keeps its control of them after a reconnection. An emergency stop without a connection is sent on reconnection, if that is soon and its print still exists; otherwise expired() is called. */
 export function printsLine(follow, refused, expired) {
   let owed = [], waiting = 0;
   const sendOwed = (prints) => {

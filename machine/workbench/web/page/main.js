@@ -1,4 +1,4 @@
-// Main: the line to the server, the picture and the panels put together.
+// Main: connects the server, the picture and the panels.
 
 import { $, button, duration, hide, listen, made, notice, onData, onKeys, putNew, tabsOf, tell, themeSwitch, toggle, withWholeOptions } from "../../../view/template/elements.js";
 import { cameraOf, CORNERS, handle, viewButtons, viewKeys } from "../../../view/template/picture/camera.js";
@@ -72,23 +72,23 @@ function tellState({ model, busy, undo, redo, search, slicing, comparing, prepar
   root.toggleAttribute("data-searching", Boolean(search));
   toggle("no-model", !model);
   for (const [id, word] of Object.entries({ undo, redo })) Object.assign($(id), { ariaLabel: word ? `${id}: ${word}` : id, disabled: !word });
-  const place = $(model ? "earlier-work" : "drop"); // where nothing is open, it is offered at once
+  const place = $(model ? "earlier-work" : "drop"); // offered immediately where no model is open
   if (!place.contains($("kept-field"))) place.append($("kept-field"));
 }
 
 /** A fieldset disables all controls in it, also those that are added later. Every control of the bench is in one; prints have a connection of their own. */
 const onlyWithLine = (open) => document.querySelectorAll("fieldset:is(.linked, :not(#printing *))").forEach((fields) => { fields.disabled = !open; });
 
-/** What could not be done last, for as long as it is so or until it is read. */
+/** The last error, until it no longer applies or has been dismissed. */
 function problemLine() {
   onState(({ problem, refused, units }) => {
-    putNew($("problem"), problem, () => withWholeOptions(problem)); // read aloud once
+    putNew($("problem"), problem, () => withWholeOptions(problem)); // announced once by screen readers
     hide({ problem: !problem, "put-aside": !refused });
     putNew($("units"), units?.words || [], () => (units?.words || []).map((unit) => button(`in ${unit}`, () => send({ do: "unit", unit }))));
   });
 }
 
-/** All steps that can be undone and done again, the newest first; one click goes there. */
+/** All steps that can be undone and redone, the newest first; a click goes to one. */
 function historyMenu() {
   const stepTo = (name) => (word, k) => button(word, () => send({ do: name, count: k + 1 }), { className: name });
   onNew(({ steps }) => steps, ({ undo, redo }) => {
@@ -96,7 +96,7 @@ function historyMenu() {
   });
 }
 
-/** A print that this page has had sliced is looked at as soon as it is ready, unless something else is looked at by then. */
+/** A print that this page requested to slice is shown when it is ready, unless something else is shown by then. */
 function previewOf() {
   let wanted = false;
   listen("click", { slice: () => {
@@ -111,10 +111,10 @@ function previewOf() {
   });
 }
 
-const MOMENT_S = 2; // from which on the time is shown
+const MOMENT_S = 2; // shorter times are not shown
 const PROGRESS = ["summary", "search-told", "slicing-told", "comparing-told"];
 
-/** How long the present task has taken, after its progress texts. */
+/** Elapsed time of the current task, after its progress texts. */
 function elapsedTime() {
   let task = "", start = 0;
   const show = () => {
@@ -128,9 +128,9 @@ function elapsedTime() {
   setInterval(show, 1000);
 }
 
-const CONTROLS = { z: "undo", y: "redo", r: "slice", g: "save-gcode", o: "open" }; // with Ctrl held
+const CONTROLS = { z: "undo", y: "redo", r: "slice", g: "save-gcode", o: "open" }; // while Ctrl is held
 
-/** What keys do; undo and redo, but where what is typed has an undo of its own. */
+/** Actions of keys; undo and redo, except in fields that have an undo of their own. */
 function keysOf(camera, picture) {
   const click = (id) => () => $(id).click();
   onKeys({
@@ -148,4 +148,4 @@ function keysOf(camera, picture) {
 }
 
 main();
-globalThis.$ = $; // for whoever tries the page from a console; modules["FOLDER/NAME"] has the rest
+globalThis.$ = $; // for experiments in a browser's console; modules["FOLDER/NAME"] has the rest

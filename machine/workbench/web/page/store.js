@@ -1,9 +1,9 @@
-// Store: the state of the page, changed by update() alone. A panel subscribes to what it shows.
+// Store: the state of the page, changed only by update(). Panels subscribe to what they show.
 
 import { keptIn } from "../../../view/template/elements.js";
 
-/** state: the server's; line: status of the connection, a key of LINE_STATUS; tab: the open one; triangles: of the model; turning, placing, hand, zoneHand: rotation, place, plane and box while they are dragged; seen: {size_mm} of the drawn model.
- * clicks: use of the next click on the model, a key of WANTED; part, zone: the chosen ones, 0 and null: none; corner: the first one of a box; facets: of the hull, and the highlighted one; figures: of the planes on the bench; row: of the front while its slider is dragged.
+/** state: the server's; line: status of the connection, a key of LINE_STATUS; tab: the open one; triangles: of the model; turning, placing, hand, zoneHand: rotation, position, plane and box while they are dragged; seen: {size_mm} of the drawn model.
+ * clicks: use of the next click on the model, a key of WANTED; part, zone: the selected ones, 0 and null: none; corner: the first one of a box; facets: of the hull, and the highlighted one; figures: of the planes on the bench; row: of the front while its slider is dragged.
  * pieces, apart: the parts as bodies, and their distance in the exploded view; faceMarks, pedestal, others, walls: as received; looking: the print is shown, "gcode": the open G-code file. */
 export const store = {
   state: null, line: "", tab: "model", dark: false, triangles: null, turning: null, placing: null, seen: null, clicks: "", part: 0, facets: null, figures: null, hand: null, row: null, pieces: null, apart: 0,
@@ -11,7 +11,7 @@ export const store = {
 };
 const listeners = [], waiting = [];
 
-/** Change some of it: all who have subscribed are told, in their order. What they change themselves comes next. */
+/** Change entries of the state, then call all subscribers in order. Changes that they make themselves are applied afterwards. */
 export function update(changes) {
   waiting.push(changes);
   if (waiting.length > 1) return;
@@ -22,10 +22,10 @@ export function update(changes) {
   }
 }
 
-/** listener(store, as it was before): from the first state on. */
+/** Call listener(store, the previous store) after every change, from the first state. */
 export const subscribe = (listener) => listeners.push(listener);
 
-/** changed(what is picked of the state): from the first one on, and whenever that is other than it was. */
+/** Call changed(value picked from the state) for the first state and whenever the value differs from the last one. */
 export function onNew(pick, changed) {
   let told = "";
   onState((state) => {
@@ -36,18 +36,18 @@ export function onNew(pick, changed) {
   });
 }
 
-/** listener(state, the one before): for every new state. */
+/** Call listener(state, the previous state) for every new state of the server. */
 export const onState = (listener) => subscribe((now, before) => { if (now.state !== before.state) listener(now.state, before.state); });
 
-/** What a tab keeps of a page: see keptIn(). */
+/** Values that a tab keeps for a page: see keptIn(). */
 export const keptInTab = (name, usual) => keptIn("sessionStorage", `${name} ${location.pathname}`, usual);
 
-const SEEN = ["yaw", "pitch", "target", "distance", "radius"]; // of a camera
+const SEEN = ["yaw", "pitch", "target", "distance", "radius"]; // fields of a camera that are kept
 
-/** A function that, once the model is there, takes the view that was kept of it. Call it when the tabs are there. */
+/** Return a function that restores the kept view once the model is loaded. Call it when the tabs exist. */
 export function keptLook(camera, picture) {
   const kept = keptInTab("look", { tab: "", camera: null });
-  let waiting = kept.now.camera; // its view comes with its model
+  let waiting = kept.now.camera; // a view is restored only for its own model
   document.getElementById(`tab-${kept.now.tab}`)?.click();
   subscribe((now, before) => { if (now.tab !== before.tab) kept.keep({ tab: now.tab }); });
   addEventListener("pagehide", () => {

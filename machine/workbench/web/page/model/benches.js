@@ -1,4 +1,4 @@
-// Benches: several models at once, on one plate or each on a bench and in a page of its own; what was left from earlier; and the devices that were let in.
+// Benches: several models at once, on one plate or each on a bench and in a page of its own; autosaved work and files of earlier runs; and paired devices.
 
 import { $, button, clock, hide, listen, made, moment, notice, partsInWords, putRows, removeButton, sayIn, tell } from "../../../../view/template/elements.js";
 import { lineAt, OWN_PAGE, send } from "../line.js";
@@ -7,9 +7,9 @@ import { onNew, onState } from "../store.js";
 const TOLD_MS = 8000;
 const HERE = Number(location.pathname.split("/").at(-2));
 
-/** A further bench with the settings of this one, in a page of its own, where a model is opened. */
+/** A further bench with the settings of this one, in a new page, where a model is opened. */
 async function openBench(model = null) {
-  const page = window.open("", "_blank"); // at once, while the browser still knows that a person has asked for it
+  const page = window.open("", "_blank"); // immediately, since browsers open a page only in response to a click
   const answer = await fetch(`../benches?like=${HERE}`, { method: "POST" }), told = await answer.json();
   if (!answer.ok) {
     page?.close();
@@ -23,16 +23,16 @@ async function openBench(model = null) {
   if (model) await sendFile(model, {}, `../${told.number}/`);
 }
 
-/** What a person has dropped or chosen: the first model, and plans after it, for this bench; every further model on a bench of its own. */
+/** Open dropped or chosen files: the first model, and plans after it, on this bench; every further model on a bench of its own. */
 export async function takeFiles(files) {
   const isPlan = ({ name }) => name.toLowerCase().endsWith(".toml"), [first = [], ...further] = files.filter((file) => !isPlan(file));
   further.forEach((model) => openBench(model));
   for (const file of [first, ...files.filter(isPlan)].flat()) await sendFile(file);
 }
 
-let uploaded = Promise.resolve(); // when the last file has been sent: one after the other, so that bar and Cancel belong to one file
+let uploaded = Promise.resolve(); // resolves when the last file has been sent: one at a time, so that bar and Cancel belong to one file
 
-/** Send a file to a bench, with progress and a Cancel button. Resolves when the server has answered; errors arrive by the connection. how: more of its address. */
+/** Send a file to a bench, with progress and a Cancel button. Resolves when the server has answered; errors arrive by the connection. how: further parts of its address. */
 const sendFile = (file, how = {}, to = "") => new Promise((answered) => {
   uploaded = uploaded.catch(() => {}).then(() => new Promise((sent) => upload(file, how, to, sent, answered)));
 });
@@ -44,14 +44,14 @@ function upload(file, how, to, sent, answered) {
     Object.assign($("sending-bar"), { value: loaded, max: total });
     tell({ "sending-told": `Sending ${file.name}: ${mb(loaded)} of ${mb(total)} MB` });
   };
-  request.upload.onloadend = () => { hide({ sending: true }); sent(); }; // the server reads it now, which its state tells
+  request.upload.onloadend = () => { hide({ sending: true }); sent(); }; // the server is now reading it, as its state says
   request.onloadend = () => { sent(); answered(); };
   $("sending-cancel").onclick = () => request.abort();
   request.open("POST", `${to}file?${new URLSearchParams({ name: file.name, page: OWN_PAGE, ...how })}`);
   request.send(file);
 }
 
-/** The models on the plate, each with its number of copies, and what puts further ones there. */
+/** The models on the plate, each with its number of copies, and controls that add further ones. */
 export function platePanel() {
   listen("click", { "add-model": () => $("add-file").click() });
   listen("change", { "add-file": async () => {
@@ -85,7 +85,7 @@ export function benchesPanel() {
   });
 }
 
-/** List what an earlier run has left, the newest first: autosaved work ("kept"), or the files of a killed workbench ("left"). */
+/** List work of an earlier run, the newest first: autosaved work ("kept"), or the files of a killed workbench ("left"). */
 export async function offer(what) {
   const answer = await fetch(what).catch(() => null), found = answer?.ok ? await answer.json() : [];
   hide({ [`${what}-field`]: !found.length });
@@ -100,7 +100,7 @@ function offerRow(what, { key, name = "", bytes, parts, written_s: written }) {
   return made("li", {}, open, removeButton(`Remove ${title}, ${words}`, act("DELETE")));
 }
 
-/** On this computer's page, where the workbench is open to the network: which devices are paired, each with a button that lets it go. */
+/** For a workbench open to the network, on the page of this computer: the paired devices, each with a button that unpairs it. */
 export function devicesPanel() {
   const { network } = document.documentElement.dataset;
   if (network !== "open" && network !== "paired") return;
@@ -110,7 +110,7 @@ export function devicesPanel() {
 }
 
 function openDevicesLine() {
-  let until = 0; // when codes are looked at again
+  let until = 0; // time of the next check of the codes
   const line = lineAt("devices", (told) => {
     if (told.problem) return;
     tell({ "network-told": `A device that opens ${told.addresses.join(" or ")} is asked for the code that the terminal shows.${told.encrypted ? "" : " Whoever is in this network can read along."}` });

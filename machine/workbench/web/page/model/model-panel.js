@@ -1,4 +1,4 @@
-// Model panel: the file, how it is turned, what overhangs then, how large it is, and where on the plate it and its copies stand.
+// Model panel: file, orientation, overhangs, size, and positions of the model and its copies on the plate.
 
 import { $, alike, button, fill, hide, listen, listIn, mm2, numberIn, onData, putAt, putNew, sayIn, tell, tellIn } from "../../../../view/template/elements.js";
 import { add, sub } from "../../../../view/template/picture/math.js";
@@ -46,7 +46,7 @@ export function modelPanel() {
   });
 }
 
-/** The plates of a slicer file to choose from, and whether it keeps settings. */
+/** The plates of a slicer file to choose from, and whether it contains settings. */
 function tellFile({ plates, has_settings: has, settings_note: note }) {
   const shown = plates.length > 1 ? plates : [];
   putNew($("plates"), shown, () => shown.map(({ number, name, taken }) =>
@@ -64,12 +64,12 @@ function dropping() {
   });
 }
 
-/** Sides along the platform's axes as the model stands, or a hand turns it; as it is read where neither is known. */
+/** Sizes along the build plate's axes, in the current orientation or while dragged; sizes as read where neither is known. */
 export const modelSize = ({ standing, model }) => ((!store.turning && standing) || store.seen || model).size_mm;
 
 export function sizePanel() {
   const sides = TURNS.map((axis) => $(`size-${axis}`));
-  let shown = null; // the standing that was told last
+  let shown = null; // the last reported position
   const scale = (factor) => send({ do: "set", key: "process.scale", value: factor === null ? null : String(Number(factor.toPrecision(9))) });
   listen("change", { scale: () => scale(numberIn("scale") / 100) });
   listen("click", { "scale-as-read": () => scale(null) });
@@ -89,31 +89,31 @@ export function sizePanel() {
   });
 }
 
-const MIDDLE = [0, 0], STEP_MM = 1, LARGE_STEP_MM = 10; // the latter with Shift held
+const MIDDLE = [0, 0], STEP_MM = 1, LARGE_STEP_MM = 10; // the latter while Shift is held
 const WAYS = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 
 const stepOf = ({ shiftKey }) => (shiftKey ? LARGE_STEP_MM : STEP_MM);
 const rounded = (place, step) => place.map((x) => step * Math.round(x / step));
 const placeNow = () => store.placing || store.state.place_mm;
 
-/** Has the model stand somewhere else; the picture has it there until that is done or refused. */
+/** Move the model to another position; it is drawn there until the server has done or refused it. */
 function put(place) {
   if (alike(place, store.state.place_mm)) return update({ placing: null });
   update({ placing: place });
   ask({ do: "set", key: "process.place_mm", value: alike(place, MIDDLE) ? null : `[${place.join(", ")}]` }, () => { if (store.placing === place) update({ placing: null }); });
 }
 
-/** Where on the plate the model and its copies stand: dragged there in the picture, by arrow keys, or typed. */
+/** Positions of the model and its copies on the plate: dragged in the picture, changed by arrow keys, or typed. */
 export function placePanel(picture) {
   const fields = [$("place-x"), $("place-y")];
-  const putFar = (place) => { put(place); picture?.fit(); }; // it may be out of sight there
+  const putFar = (place) => { put(place); picture?.fit(); }; // it may be out of view there
   fields.forEach((field) => field.addEventListener("change", () => putFar(fields.map(({ value }) => Number(value)))));
   $("place-middle").addEventListener("click", () => putFar(MIDDLE));
   onState(({ plate_told: extent }) => tell({ "place-told": extent }));
-  let told = "", copies = [[...MIDDLE, 0]]; // where they stand; the first is the one that hands turn, cut and mark
+  let told = "", copies = [[...MIDDLE, 0]]; // their positions; the first one is the model that the user turns, cuts and marks
   subscribe(({ state }, before) => {
     const now = JSON.stringify(placeNow());
-    if (state.copies_mm) copies = state.copies_mm.map((place) => [...place, 0]); // none are known yet of a model that has just been turned
+    if (state.copies_mm) copies = state.copies_mm.map((place) => [...place, 0]); // unknown just after the model was turned
     picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])), [...placeNow(), 0], state.misplaced);
     if (state.misplaced && !before.state?.misplaced) picture?.fit();
     if (now === told) return;
@@ -123,10 +123,10 @@ export function placePanel(picture) {
   if (picture) handleOf(picture);
 }
 
-/** The knob at the model's foot. */
+/** The handle at the model's foot. */
 function handleOf(picture) {
   const knob = $("hand-place"), hold = (placing) => update({ placing });
-  /** Where a hand is on the plate, from the middle of the model as it stands now; null: it looks above the plate's horizon. */
+  /** The pointer's position on the plate, relative to the model's middle; null: it is above the plate's horizon. */
   const onPlate = (event) => {
     const [eye, along] = picture.sight(event);
     return along[2] * eye[2] < 0 ? [0, 1].map((axis) => eye[axis] - (along[axis] * eye[2]) / along[2] + placeNow()[axis]) : null;

@@ -1,4 +1,4 @@
-// Model: fetched, drawn as it stands, red where it overhangs or in the colours of its parts, on its pedestal; and the ways in which it can lie.
+// Model: fetched and drawn in its orientation, red where it overhangs or in the colours of its parts, on its pedestal; and its stable orientations.
 
 import { $, alike, button, hide, made, mm2, notice, swatches, tell } from "../../../../view/template/elements.js";
 import { add, scaled, sub } from "../../../../view/template/picture/math.js";
@@ -10,9 +10,9 @@ import { cornersAt, faceMet } from "../scene/face-tree.js";
 import { overhanging, standingBy, trianglesFrom } from "../scene/triangles.js";
 import { onState, store, subscribe, update } from "../store.js";
 
-const MANY_FACES = 100000; // to fetch and draw them takes a moment, which is told
+const MANY_FACES = 100000; // fetching and drawing more takes a moment, so a message is shown
 
-/** A function that fetches the triangles of a model where they are others than those that are there; again(): asks once more. */
+/** Return a function that fetches a model's triangles when they differ from the loaded ones; again(): fetch once more. */
 export function modelFetcher(picture, again) {
   const begin = () => {
     const faces = store.state.model?.faces || 0;
@@ -32,9 +32,9 @@ export function modelFetcher(picture, again) {
   return (model) => fetchTriangles(model?.drawn ? model.key : "", `model/${model?.key}`);
 }
 
-/** The model as it stands, or a hand turns it: the figure of what overhangs is the server's as soon as nothing moves. */
+/** The model in its orientation, or as it is being dragged; the server computes the overhanging area when nothing moves. */
 export function modelOf(picture) {
-  let stood = "", red = null; // red: which faces are
+  let stood = "", red = null; // red: a flag for each face
   subscribe(({ state, triangles, turning }, before) => {
     if (!triangles) return;
     const began = performance.now(), { limit, platform_mm: platform, pedestal_mm: lift, overhang_mm2: area } = state, rotation = turning || state.rotation;
@@ -51,11 +51,11 @@ export function modelOf(picture) {
     if (picture) look(picture, red);
     if (!stoodOtherwise) return;
     document.documentElement.dataset.liveMs = (performance.now() - began).toFixed(1);
-    if (!turning && before.state && !alike(state.front, before.state.front)) picture?.fit(); // laid down by a search, nobody's hand chose what is seen
+    if (!turning && before.state && !alike(state.front, before.state.front)) picture?.fit(); // a search chose the orientation, so the user has not chosen the view
   });
 }
 
-/** Show the parts in their colours, or the row of the front that is being chosen; on the Model tab the red faces. Single limbs are visible as pieces only. */
+/** Show the parts in their colours, or the row of the front that is being chosen; on the Model tab the red faces. Single limbs are visible only as pieces. */
 function look(picture, red) {
   const { state: { search, parts, colours }, tab, row, part } = store;
   const planes = row ? row.planes : search?.planes.length ? search.planes : parts ? planesNow() : null, cut = tab !== "model" && planes;
@@ -66,7 +66,7 @@ function look(picture, red) {
   $("legend").replaceChildren(...(entries.length ? [made("b", { text: "parts, in print order" }), ...entries] : []));
 }
 
-/** What else stands on the plate while the model stands still, by its name: turned, it would have another pedestal, and the other models other places. */
+/** The other bodies on the plate, by name, while the model does not move: a rotation changes the pedestal and the positions of other models. */
 export function bodiesOf(picture) {
   for (const name of ["pedestal", "others"]) {
     const take = (body, of) => {
@@ -81,9 +81,9 @@ export function bodiesOf(picture) {
 }
 
 const COLOUR = [230, 159, 0, 255], FAINT = 0.3, LIT = 0.85;
-const OUT_SHARE = 0.002; // of the model's size, by which they are drawn outside of it
+const OUT_SHARE = 0.002; // share of the model's size by which they are drawn outside it
 
-/** The triangles of facets, {corners, count, owners: the place of each one's facet}. */
+/** The triangles of facets: {corners, count, owners: the index of each triangle's facet}. */
 function hullOf(facets) {
   const owners = facets.flatMap(({ corners }, k) => Array(corners.length / 9).fill(k));
   return { corners: facets.flatMap(({ corners }) => corners), count: owners.length, owners };
@@ -92,7 +92,7 @@ function hullOf(facets) {
 /** The facet of the hull under an event; -1: none. */
 const facetMet = ({ hull }, picture, event) => hull.owners[faceMet(hull, ...picture.ray(event)).face] ?? -1;
 
-/** Lays the facet under an event down. */
+/** Place the facet under an event on the build plate. */
 export function layFacet(picture, event) {
   const facet = store.facets?.facets[facetMet(store.facets, picture, event)];
   if (!facet) return;
@@ -100,7 +100,7 @@ export function layFacet(picture, event) {
   send({ do: "lay", normal: facet.normal });
 }
 
-/** What of the model's hull it can rest on, lit where one of them is to be laid down. */
+/** Facets of the model's hull on which it can rest, highlighted while the user chooses one. */
 export function facetsOf(picture) {
   const fetchFacets = newest({ read: (answer) => answer.json(), insists: true, take: (facets, key) => update({ facets: facets && { key, facets, hull: hullOf(facets), lit: -1 } }) });
   $("canvas").addEventListener("pointermove", (event) => {
@@ -124,17 +124,17 @@ function facetDrawn({ normal, corners }, lit, picture) {
   return { solid: trianglesOf([{ corners: places, colour: COLOUR }]), matrix: picture.matrix(), strength: lit ? LIT : FAINT };
 }
 
-/** A small picture of the model as it would stand by a rotation, drawn as soon as nothing else is to be done. */
+/** A thumbnail of the model in a rotation, drawn when the browser is idle. */
 const thumbnail = (rotation) => made("canvas", { width: 112, height: 84, className: "thumbnail", rotation });
 
-/** The ways in which the model rests, and how a search has laid it down; without a picture in words alone. */
+/** Buttons for the model's stable orientations and the one that a search chose; without WebGL2 they have only text. */
 export function thumbnailsOf(picture) {
-  let told = "", model = null; // of what there are small pictures
+  let told = "", model = null; // thumbnails exist for these
   subscribe(({ state: { resting, laid }, triangles }) => {
     const now = JSON.stringify([resting, laid]), drawn = triangles && picture, views = laid && drawn ? [["as it stood", laid.before], ["as it lies now", laid.after]] : [];
     if (now === told && triangles === model) return;
     [told, model] = [now, triangles];
-    const held = $("resting").contains(document.activeElement); // the present one has the keyboard then, as the one that was pressed
+    const held = $("resting").contains(document.activeElement); // the pressed button was focused, so focus the current one
     $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area, present }) => {
       const lay = () => { update({ clicks: "" }); send({ do: "stand", rotation }); };
       return button("", lay, { ariaPressed: String(present) }, drawn ? thumbnail(rotation) : "", made("span", { text: words }), made("small", { text: mm2(area) }));

@@ -1,4 +1,4 @@
-// Rings: three about the model, by which it is turned about the platform's x, y and z; red follows as it does for the sliders.
+// Rings: three rings around the model that turn it about the build plate's x, y and z; red follows as it does for the sliders.
 
 import { $, listen, pressed } from "../../../../view/template/elements.js";
 import { add, length, RAD, scaled, sub } from "../../../../view/template/picture/math.js";
@@ -9,14 +9,14 @@ import { turnedFurther } from "../scene/triangles.js";
 import { store, update } from "../store.js";
 
 const RING_AXES = { x: [1, 0, 0], y: [0, 1, 0], z: [0, 0, 1] };
-const RING_STEPS = 96, RING_REACH = 1.05; // of the farthest vertex from the middle
-const RING_KEY_DEG = 1, RING_SNAP_DEG = 15; // the latter with Shift held
-const FINE_STEPS = 720; // around a ring, by which a hand turns it
-const BEHIND_PIXELS = 3; // by which the side of a ring that is behind its middle gives way to the other
+const RING_STEPS = 96, RING_REACH = 1.05; // RING_REACH: share of the farthest vertex's distance from the middle
+const RING_KEY_DEG = 1, RING_SNAP_DEG = 15; // the latter while Shift is held
+const FINE_STEPS = 720; // points around a ring, from which the one under the pointer is taken
+const BEHIND_PIXELS = 3; // added to the distance of points on a ring's far side, so that the pointer prefers its near side
 
 export function ringsOf(picture) {
   const svg = $("rings"), groups = [...svg.querySelectorAll("[data-ring]")], on = () => $("show-rings").getAttribute("aria-pressed") === "true";
-  let turning = null; // {axis, ring, deg}: how far it is turned from where it stood
+  let turning = null; // {axis, ring, deg}: rotation since the drag began
   const ringNow = () => {
     const [least, most] = picture.box();
     return { centre: scaled(add(least, most), 0.5), radius: RING_REACH * store.triangles.reach_mm };
@@ -54,7 +54,7 @@ export function ringsOf(picture) {
     });
   });
   const shown = () => Boolean(on() && store.tab === "model" && store.triangles && store.state.model && store.clicks !== "lay");
-  picture.drawn.push(() => { // where the rings are seen now
+  picture.drawn.push(() => { // position of the rings on the screen
     svg.toggleAttribute("hidden", !shown());
     if (!shown()) return;
     const ring = turning ? turning.ring : ringNow(), eye = picture.eye();
@@ -69,7 +69,7 @@ export function ringsOf(picture) {
     showSweep(picture, turning);
   });
   listen("click", { "show-rings": () => { pressed("show-rings", !on()); picture.ask(); } });
-  /** Places of the rings, as far as they are shown. */
+  /** Points of the rings, as far as they are shown. */
   return () => (shown() ? Object.values(RING_AXES).flatMap((axis) => ringPoints(axis, ringNow())) : []);
 }
 
@@ -77,7 +77,7 @@ const onRing = (axis, { centre, radius }, angle) => ringOf(centre, axis, radius,
 
 const ringPoints = (axis, ring) => [...ringOf(ring.centre, axis, ring.radius, RING_STEPS), onRing(axis, ring, 0)];
 
-/** Angle at which a ring was taken (from), and the degrees by which an event has turned it: the ring follows the pointer by its nearest visible point within a quarter turn of the last one. */
+/** The angle at which a ring was grabbed (from) and the degrees by which an event has turned it: the ring follows the pointer by its nearest visible point within a quarter turn of the last one. */
 function graspOf(picture, axis, ring, event) {
   const { left, top } = $("canvas").getBoundingClientRect(), eye = picture.eye(), middle = length(sub(eye, ring.centre));
   const nearest = ({ clientX, clientY }, angles) => angles.map((angle) => {
@@ -95,13 +95,13 @@ function graspOf(picture, axis, ring, event) {
   };
 }
 
-/** An SVG path along the places that are seen and wanted. */
+/** An SVG path along the visible and wanted points. */
 function pathOf(seen, wanted) {
   const drawn = (spot) => spot?.at && wanted(spot);
   return seen.map((spot, k) => (drawn(spot) ? `${drawn(seen[k - 1]) ? "L" : "M"}${spot.at.map((x) => x.toFixed(1)).join(" ")}` : "")).join("");
 }
 
-/** The sector by which the model is turned just now, and its angle. */
+/** The sector and the angle by which the model is being turned. */
 function showSweep(picture, turning) {
   $("ring-sweep").setAttribute("d", "");
   $("ring-told").textContent = turning ? `${turning.deg}°`.replace("-", "−") : "";

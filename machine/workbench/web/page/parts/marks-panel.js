@@ -1,4 +1,4 @@
-// Marks: boxes and faces for which a person asks something: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
+// Marks: boxes and faces that the user marks: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
 import { $, alike, fill, listen, made, numberIn, putAt, putTable, removeButton, rowOf, swatch, tell } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
@@ -12,19 +12,19 @@ const MARK_KINDS = {
   keep: { word: "no cut", colour: [118, 66, 214] }, no_seam: { word: "no seam", colour: [0, 128, 122] }, no_support: { word: "no support", colour: [196, 24, 126] },
   support: { word: "support", colour: [196, 128, 0] },
 };
-const MODIFIER = { word: "modifier", colour: [84, 92, 104] }; // of a plan or a model file: shown, not changed
-const KIND_NAMES = Object.keys(MARK_KINDS); // their places are the bits of a face's byte
-const BOX_SIDES = [0, 1, 2].flatMap((axis) => ["min_mm", "max_mm"].map((end) => ({ axis, end }))); // as the page has handles and numbers
-const PAINT = 0.6; // faces are painted in darker colours, which no part has
-const AROUND_MM = 1; // of the corners that are clicked, so that a box reaches through the surface
+const MODIFIER = { word: "modifier", colour: [84, 92, 104] }; // from a plan or a model file: shown, not changed
+const KIND_NAMES = Object.keys(MARK_KINDS); // an index is the bit in a face's byte
+const BOX_SIDES = [0, 1, 2].flatMap((axis) => ["min_mm", "max_mm"].map((end) => ({ axis, end }))); // the page has handles and numbers for each
+const PAINT = 0.6; // marked faces get darker colours, which no part has
+const AROUND_MM = 1; // margin around the clicked corners, so that a box reaches through the surface
 const THINNEST_MM = 0.2, STEP_MM = 0.5;
 
-/** A box's own axes: a model that was turned has taken them along. */
+/** A box's own axes: they turned with the model. */
 const axesOf = ({ axes }) => axes || [[1, 0, 0], [0, 1, 0], [0, 0, 1]];
-/** A place that is told along a box's own axes, in the platform's frame. */
+/** A point given in a box's own axes, in the build plate's frame. */
 const fromBox = (zone, place) => axesOf(zone).reduce((sum, axis, k) => add(sum, scaled(axis, place[k])), [0, 0, 0]);
 
-/** The colours of all corners, marked faces in those of their first kind. */
+/** Colours of all corners; marked faces have that of their first kind. */
 export function markedOver(bits, colours) {
   if (!bits) return colours;
   const words = new Uint32Array(colours.buffer), inks = KIND_NAMES.map((kind) => wordOf(scaled(MARK_KINDS[kind].colour, PAINT)));
@@ -45,7 +45,7 @@ const boxes = () => store.state.zones.filter((zone) => zone.min_mm).map((zone) =
 const boxNow = () => boxes().find((zone) => sameMark(zone, store.zone)) || null;
 const facesNow = () => store.state.zones.find((zone) => sameMark(zone, store.zone) && zone.point_mm);
 
-/** A click on the model where faces or a corner of a box are marked. */
+/** A click on the model that marks faces or a corner of a box. */
 export function markAt(place) {
   if (store.clicks === "faces") return send({ do: "mark", kind: kindNow(), point_mm: fine(place), angle_deg: numberIn("mark-angle") });
   if (!store.corner) return update({ corner: place });
@@ -70,7 +70,7 @@ function putBox(zone) {
 /** A box with another value of one side. */
 const withSide = (zone, { axis, end }, value) => ({ ...zone, [end]: zone[end].map((x, k) => (k === axis ? value : x)) });
 
-/** The same, but never thinner than it can be. */
+/** A box with another value of one side, never thinner than allowed. */
 function draggedSide(zone, side, at) {
   const { axis, end } = side;
   return withSide(zone, side, end === "min_mm" ? Math.min(at, zone.max_mm[axis] - THINNEST_MM) : Math.max(at, zone.min_mm[axis] + THINNEST_MM));
@@ -125,14 +125,14 @@ export function marksPanel(picture) {
   });
 }
 
-/** Boxes and marked faces in the picture, where parts are looked at. */
+/** Boxes and marked faces, shown where parts are shown. */
 function showMarks(picture) {
   const { tab, state, zone: chosen, faceMarks } = store, seen = tab === "parts" && state.model ? [...state.modifiers, ...boxes()] : [];
   picture.extra("marks", JSON.stringify([seen, chosen]), () => seen.flatMap((zone) => boxDrawn(zone, sameMark(zone, chosen))));
   picture.marks(tab === "parts" ? faceMarks : null);
 }
 
-/** Has a handle move one side of the chosen box. */
+/** Let a handle move one side of the selected box. */
 function gripSide(handle, side, picture) {
   gripOf(handle, {
     take: (event) => {
@@ -145,7 +145,7 @@ function gripSide(handle, side, picture) {
   });
 }
 
-/** What a box looks like: its sides let the light through; the edges of the chosen one are seen through all. */
+/** The look of a box: its sides are translucent; the edges of the selected one are visible through everything. */
 function boxDrawn(zone, chosen) {
   const { kind, min_mm: least, max_mm: most } = zone, { colour } = MARK_KINDS[kind] || MODIFIER, seen = (corners) => corners.map((place) => fromBox(zone, place));
   const sides = trianglesOf([{ corners: seen(boxCorners(least, most)), colour: [...colour, 200] }]);

@@ -1,4 +1,4 @@
-// Parts panel: the search, its front as a slider, and every part as a card, chosen there as in the picture, with keys and a menu for what is done to it.
+// Parts panel: the search, its front as a slider, and a card for every part, selected there or in the picture, with keys and a menu for its actions.
 
 import { $, alike, button, disable, hide, listen, made, moveFocus, needsKey, partsInWords, putNew, swatch, tell, tellIn, termsOf, toggle } from "../../../../view/template/elements.js";
 import { ask, send } from "../line.js";
@@ -19,9 +19,9 @@ export function partsPanel() {
     putNew($("front-notes"), notes, () => notes.map(noteOf));
     hide({ recommended: !recommended, "front-stale": front.length > 0 });
   };
-  let held = null; // the front whose slider is under the hand: nothing moves it there, not even another front
+  let held = null; // the front whose slider is being dragged: nothing else moves it, not even another front
   const hold = () => { held ||= store.state.front; };
-  /** The slider's row as the newest front has it, with its time and plastic; as it was where that has none of so many parts. */
+  /** The slider's row in the newest front, with its time and plastic; the old row where that front has none with its number of parts. */
   const follow = (row) => {
     const newest = store.state.front.find(({ parts }) => parts === row.parts) || row;
     update({ row: newest });
@@ -29,7 +29,7 @@ export function partsPanel() {
   };
   const letGo = () => { if (held) { held = null; show(); } };
   listen("pointerdown", { front: hold });
-  for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first
+  for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // the change event comes first
   listen("blur", { front: letGo });
   listen("input", { front: () => { hold(); follow(held[$("front").value]); } });
   listen("change", { front: () => {
@@ -55,9 +55,9 @@ const marksUnder = (front, best) => putNew($("front-marks"), [front, best], () =
   name: `take-${row.parts}`, className: row.parts === best ? "recommended" : "", title: [partsInWords(row.parts), row.parts === best && "recommended", besideOne(row)].filter(Boolean).join(", "),
 }))));
 
-const RELATIVE = { support: "support_area_mm2", time: "time_s", plastic: "filament_mm" }; // what is told beside one piece, by the names of a row's values
+const RELATIVE = { support: "support_area_mm2", time: "time_s", plastic: "filament_mm" }; // values compared with one piece, by word
 
-/** What a row of the front costs more or less than the model in one piece, in words; "": that is the row, or it is not known. */
+/** The difference of a front's row from the model in one piece, in words; "": it is that row, or unknown. */
 function besideOne(row) {
   const [one] = store.state.front, change = (name) => Math.round(100 * (row[name] / one[name] - 1));
   if (one?.parts !== 1 || !row || row.parts === 1) return "";
@@ -65,7 +65,7 @@ function besideOne(row) {
   return known.map(([word, name]) => `${change(name) > 0 ? "+" : change(name) < 0 ? "−" : "±"}${Math.abs(change(name))} % ${word}`).join(", ");
 }
 
-/** A note of the search, with a button for what it proposes. */
+/** A note of the search, with a button for its proposal. */
 const noteOf = ({ text, parts }) => made("li", {}, text, ...(parts ? [button(`Choose ${partsInWords(parts)}`, () => send({ do: "take", parts }))] : []));
 
 function tellRow(row) {
@@ -83,7 +83,7 @@ function tellRow(row) {
 
 const SIDES = ["right", "right and back", "back", "left and back", "left", "left and front", "front", "right and front"];
 
-/** A printing direction as somebody in front of the machine sees it. */
+/** A printing direction as seen from the front of the machine. */
 function directionInWords(direction) {
   const [tilt, towards] = anglesOf(direction);
   return tilt < 0.05 ? "straight up" : `${Number(tilt.toFixed(1))}° to the ${SIDES[(Math.round(towards / 45) + 8) % 8]}`;
@@ -98,7 +98,7 @@ function cardRows(number) {
   return number > 1 ? [...rows, [piece?.joint?.weakest ? "icon-joint weakest" : "icon-joint", "joint", piece?.holds || "–"]] : rows;
 }
 
-/** A part as a card: chosen by a click or the keyboard, its plane locked by a switch. */
+/** A part as a card: selected by a click or the keyboard, its plane locked by a switch. */
 function partCard(number, figures) {
   const choose = made("input", { type: "radio", name: "part", value: number, checked: number === store.part, onchange: () => choosePart(number) });
   const words = made("small", { text: directionInWords(planesNow()[number - 2]?.normal || [0, 0, 1]), className: "words" });
@@ -112,7 +112,7 @@ function partCard(number, figures) {
   return card;
 }
 
-/** Every part with the plane it stands on as a card, chosen there as in the picture; keys and a menu for what is done to it. */
+/** A card for every part with its base plane, selected there or in the picture; keys and a menu for its actions. */
 export function partsList() {
   addEventListener("keydown", (event) => {
     const typing = event.target.closest?.("[data-typing], #marks, dialog, .menu");
@@ -127,7 +127,7 @@ export function partsList() {
   });
 }
 
-/** What a part's menu has: words, whether it can be done, and how. */
+/** Entries of a part's menu: words, whether it is enabled, and its action. */
 const entriesOf = (part) => [
   ["Remove", part > 1 && !isLocked(part), () => removePart(part)],
   [isLocked(part) ? "Unlock" : "Lock", part > 1, () => lockPart(part, !isLocked(part))],
@@ -141,7 +141,7 @@ function showSettings(part) {
   $("tab-settings").click();
 }
 
-/** The menu of a part at a place of the window. */
+/** The menu of a part at a position in the window. */
 export function openMenu(part, x, y) {
   if (!store.state.parts) return;
   choosePart(part);

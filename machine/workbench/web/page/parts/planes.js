@@ -1,4 +1,4 @@
-// Planes: those that are looked at, as the bench has them or a hand holds one: their panel, the knobs in the picture, and what a refused one is in the way of.
+// Planes: those shown, from the bench or being dragged: their panel, the handles in the picture, and the obstacles of a rejected one.
 
 import { $, alike, disable, fill, hide, listen, mm2, numberIn, onData, pressed, putAt, tell } from "../../../../view/template/elements.js";
 import { add, clamp, cornersOf, cross, dot, length, RAD, rotated, scaled, sub, turned, unit } from "../../../../view/template/picture/math.js";
@@ -11,10 +11,10 @@ import { normalAt, sectionOf } from "../scene/triangles.js";
 import { onState, store, subscribe, update } from "../store.js";
 import { apartNow } from "./pieces.js";
 
-const TOP = 1e-9; // of the length of what is left of a direction across z, below which it points nowhere
-const SAME = 1e-9; // mm, or of a direction
+const TOP = 1e-9; // shortest part of a unit vector across z that has a direction
+const SAME = 1e-9; // mm, or difference of directions
 
-/** Tilt from upright and the way towards which a normal leans, degrees. */
+/** Tilt from upright and the azimuth of a normal, degrees. */
 export const anglesOf = ([x, y, z]) => [Math.acos(clamp(z, -1, 1)) / RAD, Math.hypot(x, y) > TOP ? Math.atan2(y, x) / RAD : 0];
 
 const alikePlanes = (a, b) => [a.offset_mm - b.offset_mm, ...a.normal.map((x, k) => x - b.normal[k])].every((difference) => Math.abs(difference) < SAME);
@@ -22,21 +22,21 @@ const alikeBut = (planes, others, but) => planes.length === others.length && pla
 
 export const planesNow = () => store.state.cuts.map((plane, k) => (store.hand?.part === k + 2 ? store.hand.plane : plane));
 
-/** The plane of the chosen part; null where it has none. */
+/** The plane of the selected part; null where it has none. */
 const planeNow = () => planesNow()[store.part - 2] || null;
 
 export const isLocked = (part = store.part) => store.state.locked[part - 2];
 
-/** The figures of the planes as they are looked at, those of a moment ago while a hand moves one; null: not known. */
+/** The figures of the planes that are shown, the last accepted ones while one is dragged; null: unknown. */
 export const figuresNow = () => {
   const { figures, hand, state } = store;
   return hand ? hand.allowed.figures : figures && alikeBut(figures.cuts, state.cuts) ? figures : null;
 };
 
-/** 0: none; its plane is one to be moved, where it has one. */
+/** Select a part and its plane, if any; 0: none. */
 export const choosePart = (part) => update({ part: part <= store.state.parts ? part : 0, hand: null });
 
-/** The part at a place of the platform's frame. */
+/** The part at a point of the build plate's frame. */
 export const partAt = (place) => planesNow().reduce((part, plane, k) => (dot(plane.normal, place) > plane.offset_mm ? k + 2 : part), 1);
 
 /** A plane that is dragged. plane: as shown; wanted: as dragged; allowed: the last one that a trial accepts, checked: the last one with all other parts checked, both with figures; why: the trial that rejects the wanted one, null: none. */
@@ -46,14 +46,14 @@ function handNow() {
   return { part: store.part, allowed: here, checked: here, why: null };
 }
 
-/** The plane in a hand somewhere else, to look at: its figures come when they are known. */
+/** Move a dragged plane as a preview: its figures follow when they are known. */
 function holdPlane(wanted) {
   const hand = handNow();
   send({ do: "try", part: hand.part, ...wanted });
   update({ hand: { ...hand, wanted, plane: hand.why ? hand.plane : wanted, put: false, since_ms: performance.now() } });
 }
 
-/** What a hand holds after a trial of its plane: where it cannot be cut, it stays at the last place where it can. */
+/** The drag's state after a trial of its plane: where it cannot be cut, it stays at the last feasible position. */
 function afterTrial(hand, trial) {
   const plane = trial.cuts[hand.part - 2], here = { plane, figures: trial };
   if (!trial.refused) return { ...hand, allowed: here, checked: trial.unchecked ? hand.checked : here, why: null, plane: hand.wanted };
@@ -61,7 +61,7 @@ function afterTrial(hand, trial) {
   return { ...hand, allowed, why: trial, plane: allowed.plane };
 }
 
-/** A new state with a plane in the hand. */
+/** A new state while a plane is dragged. */
 function followHand(state, before) {
   const { hand } = store, { trial } = state;
   if (!alikeBut(state.cuts, before?.cuts || [])) return update({ hand: null });
@@ -71,7 +71,7 @@ function followHand(state, before) {
   if (newest && hand.since_ms) document.documentElement.dataset.triedMs = (performance.now() - hand.since_ms).toFixed(1);
 }
 
-/** The plane there for good, or, where it cannot be cut there, at the last place where it can. */
+/** Commit the dragged plane, or its last feasible position where it cannot be cut. */
 function putPlane(plane) {
   const { allowed, ...hand } = handNow(), put = { ...hand, allowed, plane, put: true }, here = store.state.cuts[hand.part - 2];
   if (alikePlanes(plane, here)) return leavePlane();
@@ -83,7 +83,7 @@ function putPlane(plane) {
   });
 }
 
-/** The plane in the hand back where it was. */
+/** Return the dragged plane to its position before the drag. */
 function leavePlane() {
   const here = store.hand && store.state.cuts[store.hand.part - 2];
   if (here) send({ do: "try", part: store.hand.part, ...here });
@@ -93,16 +93,16 @@ function leavePlane() {
 export const removePart = (part) => send({ do: "remove", part });
 export const lockPart = (part, locked) => send({ do: "lock", part, locked });
 
-/** The part printed as another number, if there is one. */
+/** Print the part at another position in the order, if possible. */
 export const reorderPart = (part, to) => Math.min(part, to) > 1 && to <= store.state.parts && ask({ do: "reorder", part, to }, (refusal) => { if (!refusal) choosePart(to); });
 
-/** The chosen part is the piece above its plane at a place of the platform's frame alone; null: all that lies above. */
+/** Restrict the selected part to the piece above its plane at a point in the build plate's frame; null: everything above. */
 export function cutLimb(place) {
   update({ clicks: "" });
   if (planeNow()) send({ do: "limb", part: store.part, point_mm: place });
 }
 
-/** The plane takes that of a face of the model. */
+/** Move the plane into that of a face of the model. */
 export function snapTo(face, picture) {
   update({ clicks: "" });
   const normal = normalAt(store.triangles, face), [corner] = cornersAt(store.triangles.corners, face);
@@ -111,15 +111,15 @@ export function snapTo(face, picture) {
   putPlane({ normal: way, offset_mm: dot(way, seen) });
 }
 
-const WIDER = 1.25, LEAST_SHARE = 0.1; // of a section's radius and of the model's diagonal: a plane's disc is seen about a thick trunk, too
-const REACH = 1.12; // of that radius at which the knobs of the tilt stand, as wide as its disc
-const ALONG = 0.7, KNOBS_PX = 44; // the knob along the normal, of that; the least radius, so that no knob hides another
+const WIDER = 1.25, LEAST_SHARE = 0.1; // shares of a section's radius and of the model's diagonal: a plane's disc is visible around a thick trunk, too
+const REACH = 1.12; // factor on that radius for the tilt handles, as wide as the disc
+const ALONG = 0.7, KNOBS_PX = 44; // share of it for the handle along the normal; the least radius, so that no handle hides another
 const STEP_MM = 0.5, STEP_DEG = 1;
 const KNOBS = [{ id: "hand-along", tilts: null }, { id: "hand-tilt-a", tilts: 0 }, { id: "hand-tilt-b", tilts: 1 }];
 
-let last = { of: "", section: null }; // of a large model it takes a moment, and most news change nothing of it
+let last = { of: "", section: null }; // slow for a large model, and most new states do not change it
 
-/** Middle and reach of what the chosen plane cuts, where planes are looked at; null: nothing. */
+/** Middle and reach of the selected plane's section, where planes are shown; null: none. */
 function sectionNow(picture) {
   const plane = store.tab === "parts" && !apartNow() && store.triangles && store.state.model && picture ? planeNow() : null;
   if (!plane) return null;
@@ -129,33 +129,33 @@ function sectionNow(picture) {
   return last.section;
 }
 
-const GAP_PX = 24, RIM_PX = 8, TOP_PX = 56, BELOW_AXES_PX = 100; // of the tools: from model and knobs, and from the picture's edges
+const GAP_PX = 24, RIM_PX = 8, TOP_PX = 56, BELOW_AXES_PX = 100; // distances of the tools from model and handles, and from the picture's edges
 
-/** Place the tools of the chosen plane beside the model, level with y, or without room there at the picture's lower edge, or at its upper one if that hides less of what lies within so many pixels of y. */
+/** Place the tools of the selected plane beside the model, level with y, or without room there at the picture's lower edge, or at its upper one if that hides less within a number of pixels of y. */
 function putTools(picture, [, y], within) {
   const tools = $("plane-tools"), { clientWidth: width, clientHeight: height } = $("scene"), [wide, high] = [tools.offsetWidth, tools.offsetHeight];
-  const { offsetLeft, offsetWidth, offsetHeight } = $("legend"), free = offsetLeft + offsetWidth + RIM_PX, narrow = free + wide + RIM_PX > width; // nothing hides the legend
+  const { offsetLeft, offsetWidth, offsetHeight } = $("legend"), free = offsetLeft + offsetWidth + RIM_PX, narrow = free + wide + RIM_PX > width; // the legend stays visible
   const low = height - high - RIM_PX - (narrow ? offsetHeight + RIM_PX : 0), ends = cornersOf(picture.box()).map(picture.placeOf), left = Math.max(...ends.map((end) => (end ? end[0] : width))) + GAP_PX;
-  const top = $("tools").offsetTop < TOP_PX ? BELOW_AXES_PX : TOP_PX; // in a small picture the other tools stand at its upper edge
+  const top = $("tools").offsetTop < TOP_PX ? BELOW_AXES_PX : TOP_PX; // in a small picture the other tools are at its upper edge
   const hidden = [top + high - y, y - low].map((over) => over + within + GAP_PX), edge = hidden[1] > Math.max(hidden[0], 0) ? top : low;
   putAt(tools, left + wide + RIM_PX < width ? [left, clamp(y - high / 2, top, low)] : [Math.max((width - wide) / 2, narrow ? 0 : free), edge]);
 }
 
-const HEAD_ON = 0.02; // sine between a normal and the sight, below which no side is across what is seen
+const HEAD_ON = 0.02; // sine of the angle between a normal and the view direction, below which no direction in the plane is across the view
 
-/** Directions in a plane at which its tilts are taken hold of, of which neither is seen where the other or the normal is. */
+/** Directions in a plane for its tilt handles, neither of which is hidden by the other or by the normal. */
 function sidesOf({ normal }, place, picture) {
   const toEye = unit(sub(picture.eye(), place)), across = cross(toEye, normal);
   return length(across) < HEAD_ON ? beside(normal) : [unit(across), scaled(cross(normal, unit(across)), dot(normal, toEye) < 0 ? -1 : 1)];
 }
 
-/** Three knobs at the chosen plane: one moves it along its normal, two tilt it; by hand, finger or arrow keys; and its tools beside them. */
+/** Three handles at the selected plane: one moves it along its normal, two tilt it, by pointer or arrow keys; and its tools beside them. */
 export function handlesOf(picture) {
-  let section = null; // of the chosen plane
-  const far = () => REACH * Math.max(section.radius_mm, KNOBS_PX * picture.pixelAt(section.centre_mm)); // from the middle, mm
+  let section = null; // section of the selected plane
+  const far = () => REACH * Math.max(section.radius_mm, KNOBS_PX * picture.pixelAt(section.centre_mm)); // mm from the middle
   const sideOf = ({ tilts }, plane) => (tilts === null ? plane.normal : sidesOf(plane, section.centre_mm, picture)[tilts]);
   const placeOf = (knob) => add(section.centre_mm, scaled(sideOf(knob, planeNow()), (knob.tilts === null ? ALONG : 1) * far()));
-  /** The plane moved by so many mm at a knob, from how it was when it was taken. */
+  /** The plane at the start of a drag, moved by a number of mm at a handle. */
   const moved = ({ plane, middle, arm, side, tilts }, mm) => {
     if (tilts === null) return { normal: plane.normal, offset_mm: plane.offset_mm + mm };
     const normal = unit(turned(rotated(cross(side, plane.normal), Math.atan2(mm, arm)), plane.normal));
@@ -185,25 +185,25 @@ export function handlesOf(picture) {
   });
 }
 
-/** Why a part's plane cannot be cut where it lies on the bench; "": it can. */
+/** Why a part's plane on the bench cannot be cut; "": it can. */
 export const invalidNow = (part = store.part) => store.state.invalid[part - 2] || "";
 
-/** The command that puts a refused plane, or the chosen one where it is invalid, at the nearest place where it can be cut; false: there is none. */
+/** The command that moves a rejected plane, or the selected one where it is invalid, to the nearest feasible position; false: there is none. */
 const nearest = ({ part, state } = store, { normal, offset_mm } = planeNow() || {}) => state.refused?.near || (invalidNow() !== "" && !isLocked() && { do: "move", part, normal, offset_mm });
 
-/** Why the chosen plane cannot be where it is wanted; "": it can, or is back where it can. */
+/** Why the selected plane cannot be where the user wants it; "": it can, or is back where it can. */
 const refusalNow = ({ hand, state: { refused, problem } }) => (hand?.why ? `Part ${hand.why.refused_part} cannot be cut off there: ${hand.why.refused}.` : refused ? problem : "");
 
-/** The chosen part's plane: numbers, snaps, and what order it is printed in; new planes, and what becomes of those in a hand. */
+/** The selected part's plane: numbers, snaps and print order; new planes, and the end of drags. */
 export function planesPanel(picture) {
   const byPlane = (event, acts) => Object.entries(acts).forEach(([id, act]) => listen(event, { [id]: () => { if (planeNow()) act(store.part); } }));
-  /** The chosen plane with another normal, turned about the middle of its cut. */
+  /** The selected plane with another normal, turned about the middle of its cut. */
   const lean = (tilt, towards) => {
     const plane = planeNow(), about = sectionNow(picture)?.centre_mm || scaled(plane.normal, plane.offset_mm), across = Math.sin(tilt * RAD);
     const normal = [across * Math.cos(towards * RAD), across * Math.sin(towards * RAD), Math.cos(tilt * RAD)];
     putPlane({ normal, offset_mm: dot(normal, about) });
   };
-  /** A plane put where it is wanted or at the nearest place where it can be cut. */
+  /** Move a plane where the user wants it, or to the nearest feasible position. */
   const near = (command) => {
     const before = store.state.cuts;
     ask({ ...command, near: true }, (refusal) => {
@@ -225,7 +225,7 @@ export function planesPanel(picture) {
   subscribe(tellAll);
 }
 
-/** The command for a level plane half way up, for a part printed after the one that is chosen. */
+/** The command for a level plane half way up, for a part printed after the selected one. */
 function newPlane(picture) {
   const { state, part } = store, low = state.pedestal_mm, [least, most] = picture ? picture.box() : [[0, 0, low], add(modelSize(state), [0, 0, low])];
   return { do: "add", after: planeNow() ? part : Math.max(state.parts, 1), normal: [0, 0, 1], offset_mm: Math.round((least[2] + most[2]) * 5) / 10 };
@@ -251,11 +251,11 @@ function tellAll() {
   tell({ "plane-told": told, "plane-name": `Part ${part}`, unsliceable: unsliceable ? `Cannot be sliced: ${unsliceable}.` : misplaced && !sure ? "As they lie now, the models do not fit on the plate, as told under Model and Copies. To slice, the others are laid down and cut first, which may make room." : "" });
 }
 
-const PLACE_SHARE = 0.02; // of the model's diagonal: how large a place is marked
-const TOUCH_COLOUR = [255, 221, 70, 255]; // seen on the red body and on the table
-const RING_SHARES = [1, 0.5]; // of that mark's size: rings on the table where the head would touch it
+const PLACE_SHARE = 0.02; // share of the model's diagonal: size of a marker
+const TOUCH_COLOUR = [255, 221, 70, 255]; // visible on the red body and on the table
+const RING_SHARES = [1, 0.5]; // shares of that marker's size: rings on the table where the head would touch it
 
-/** What a refused plane is in the way of: the head where it would touch the table, or the places that are meant. */
+/** The obstacles of a rejected plane: the head where it would touch the table, or the marked points. */
 export function obstacleOf(picture) {
   subscribe(({ state, triangles, tab, hand }) => {
     if (!triangles || !state.model) return;
@@ -268,7 +268,7 @@ export function obstacleOf(picture) {
   });
 }
 
-/** The head where it would touch, the body that does in red. */
+/** The head where it would touch, with the touching body in red. */
 function headDrawn({ body, tip_mm: tip, rotation }, head) {
   const frame = [150, 158, 170, 255], edge = [60, 66, 76, 200], red = [...RED, 255], matrix = [...rotation.flatMap((row) => [...row, 0]), ...tip, 1];
   const touching = head.boxes.filter(({ name }) => name === body), others = head.boxes.filter(({ name }) => name !== body);
@@ -283,7 +283,7 @@ function touchDrawn({ touched_mm: [x, y, z] }, size) {
   return [{ lines: trianglesOf([{ corners: rings, colour: TOUCH_COLOUR }]), over: true }];
 }
 
-/** A small octahedron that nothing hides. */
+/** A small octahedron that is always visible. */
 function placeDrawn([x, y, z], size) {
   const tips = [[size, 0, 0], [0, size, 0], [-size, 0, 0], [0, -size, 0]].map(([a, b]) => [x + a, y + b, z]);
   const corners = tips.flatMap((tip, k) => [z + size, z - size].flatMap((end) => [tip, tips[(k + 1) % 4], [x, y, end]]));

@@ -1,4 +1,4 @@
-// Print panel: the printer, the questions before a print, and the running print, over a connection of its own: prints go on without this page.
+// Print panel: the printer, the questions before a print, and the running print, over a connection of its own: prints continue without this page.
 // Also the frame with the page of the print, which exchanges messages with this page.
 
 import { $, alike, disable, hide, listen, made, needsKey, notice, numberIn, onData, pressed, putNew, sayIn, tell, toggle, withWholeOptions } from "../../../../view/template/elements.js";
@@ -6,12 +6,12 @@ import { ANSWER_MS, OWN_PAGE, printsLine } from "../line.js";
 import { onNew, onState, store, subscribe, update } from "../store.js";
 import { askToNotify, handPanel, hear, keepHeats, notifyOver, showBar, showHand, showHeats, showHistory, showPrint, showProgress, showWhich, silence, tellTitle, webcamPanel } from "./print-shown.js";
 
-const frame = $("print-page"), heard = {}; // heard: what is done at what the page of the print says
+const frame = $("print-page"), heard = {}; // heard: handlers of the messages from the page of the print
 const post = (tiltprint, more = {}) => frame.contentWindow.postMessage({ tiltprint, ...more }, location.origin);
 
-/** A function that shows a finding, by its place in the list. The two pages look from the same side: each takes the view of the other when it is shown. */
+/** A function that shows a finding, by its index. The two pages share their view: each takes that of the other when it is shown. */
 export function printFrame(camera, picture) {
-  let ready = false, finding = null; // finding: to be shown as soon as the page is ready
+  let ready = false, finding = null; // finding: shown when the page is ready
   const postView = () => post("view", { yaw: camera.yaw, pitch: camera.pitch });
   Object.assign(heard, {
     ready: () => {
@@ -39,7 +39,7 @@ export function printFrame(camera, picture) {
     toggle("looking", looking && tab !== "printing");
     pressed("look", looking === true);
     hide({ "print-page": !looking, "leave-print": !looking });
-    if (looking) $("scene").scrollIntoView({ block: "nearest" }); // on a phone it lies above what is read
+    if (looking) $("scene").scrollIntoView({ block: "nearest" }); // on a phone it is above the text
     if (looking && there && ready) postView();
     if (!looking || there) return;
     [ready, finding] = [false, null];
@@ -57,7 +57,7 @@ export function printFrame(camera, picture) {
   };
 }
 
-/** The page of the print follows in the picture's place, where what lies here is what is printed; what it gives is called with all news. */
+/** While the bench or the open G-code file is what is printed, the page of the print can follow in the picture's place; the returned function is called with all new states. */
 function followIn(print) {
   let follows = false, shown = 0;
   const isOf = (what) => Boolean(print()?.key) && print().key === store.state?.[what]?.key, same = () => isOf("sliced") || isOf("gcode");
@@ -86,7 +86,7 @@ function followIn(print) {
   };
 }
 
-/** What is chosen of a list whose last entry is another one, typed. */
+/** The selected entry of a list whose last entry is a typed one. */
 function chosenOr(name, typed) {
   const chosen = document.querySelector(`.ports input[name=${name}]:checked`);
   return chosen ? chosen.value || $(typed).value.trim() : "";
@@ -94,7 +94,7 @@ function chosenOr(name, typed) {
 
 const port = () => chosenOr("port", "port-typed");
 
-let known = false; // the printer is chosen by a person, now or the last time, or because no other one was found
+let known = false; // the printer was chosen by the user, now or the last time, or it is the only one found
 
 function choosePort({ port: name, baud = $("baud").value, sim_speed: speed = $("sim-speed").value }) {
   $("baud").value = baud;
@@ -108,7 +108,7 @@ function choosePort({ port: name, baud = $("baud").value, sim_speed: speed = $("
 
 const SERVERS = /^(octoprint|moonraker|duet):/i;
 
-/** What the chosen port is asked for besides. */
+/** Further options for the chosen port. */
 function showPort() {
   const simulated = port() === "sim", server = SERVERS.test(port());
   hide({ "sim-speed-line": !simulated, "baud-line": simulated || server, "follow-server": !server, "send-only-line": !server, "port-hint": !$("port-other").checked });
@@ -128,7 +128,7 @@ function showPorts({ ports, asking, last_printer: last }, before) {
   if (ports?.length === 1 && !known) choosePort({ port: ports[0].port });
 }
 
-/** Prints that were cut off, those of the last run of the program among them. */
+/** Interrupted prints, including those of the program's last run. */
 function showJournals(journals, before) {
   if (alike(journals, before)) return;
   tell({ "journals-told": journals && !journals.length ? "There is no interrupted or cancelled print on this computer." : "" });
@@ -136,13 +136,13 @@ function showJournals(journals, before) {
     [path, name, `on ${machine}, up to line ${line}, ${new Date(1000 * written_s).toLocaleString()}`])));
 }
 
-/** A list of rows [value, name, words], of which one can be chosen; now: the one that is. */
+/** A list of rows [value, name, words], of which one can be selected; now: the selected one. */
 const offer = (name, now, rows) => $(`${name}s-found`).replaceChildren(...rows.map(([value, title, words]) => made("label", { className: "port" },
   made("input", { type: "radio", name, value, checked: value === now }), made("span", {}, made("b", { text: title }), made("small", { text: words })))));
 
 const STOP_KEY = "e", HOLD_MS = 600, TWICE_MS = 1000;
 
-/** Hears the key of the emergency stop in a window: held down, which the button shows, or pressed twice, for a single press may be a slip. */
+/** Handle the emergency stop key in a window: held down, as the button shows, or pressed twice, because a single press may be a slip. */
 function stopKey(stop) {
   let timer = 0, pressedAt = -Infinity;
   const release = () => { clearTimeout(timer); delete $("emergency").dataset.held; };
@@ -173,12 +173,12 @@ export function printPanel() {
   const stops = stopsAsked(() => state.prints, send, () => socket.isOpen());
   const print = () => state.prints.find((job) => job.number === chosen) || null;
   const commands = () => print()?.holder === OWN_PAGE, running = () => state.prints.filter((job) => !job.is_over);
-  /** A command to the print that is looked at, if there is one. */
+  /** Send a command to the print that is shown, if there is one. */
   const toldTo = (command) => { if (print()) send({ ...command, print: print().number }); };
 
   function show(before) {
     const known = before.prints.map((job) => job.number), fresh = state.prints.findLast((job) => !known.includes(job.number));
-    if (fresh && chosen && (fresh.holder === OWN_PAGE || !running().includes(print()))) chosen = fresh.number; // the stop beside a hand stays its print's
+    if (fresh && chosen && (fresh.holder === OWN_PAGE || !running().includes(print()))) chosen = fresh.number; // otherwise the stop button keeps its print
     else if (!print()) chosen = (running().at(-1) || state.prints.at(-1) || { number: 0 }).number;
     const lost = state.prints.find((job) => mine.has(job.number) && job.holder !== OWN_PAGE);
     if (lost) notice(`Another page has taken control of the print of ${lost.name}.`, "taken");
@@ -203,18 +203,18 @@ export function printPanel() {
   }
 
   setInterval(() => {
-    if (print()?.live) showProgress(print()); // its temperatures grow old
+    if (print()?.live) showProgress(print()); // its temperatures become outdated
     if (!state.prints.some((job) => silence(job))) return;
     showPrint(print(), commands());
     showBar(running(), print());
   }, 1000);
   const where = () => ({ port: port(), baud: numberIn("baud"), sim_speed: numberIn("sim-speed") });
-  /** gcode: the key of an open G-code file, else the bench is printed. */
+  /** gcode: the key of an open G-code file, otherwise the bench is printed. */
   const check = (gcode = "") => {
     send({ do: "check", ...where(), gcode, send_only: SERVERS.test(port()) && $("send-only").checked, force: $("force").checked });
     unforce();
   };
-  /** To the print, checked at once where its printer is known and free, for a check moves and heats nothing. */
+  /** Show the print and check it immediately where its printer is known and free, because a check moves and heats nothing. */
   const toPrint = () => {
     update({ looking: false });
     $("tab-printing").click();
@@ -241,7 +241,7 @@ export function printPanel() {
   for (const id of ["feed", "flow"]) {
     const letGo = () => delete $(id).dataset.held;
     listen("input", { [id]: () => { $(id).dataset.held = true; tell({ [`${id}-told`]: `${$(id).value} %` }); } });
-    for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // its change comes first, if any
+    for (const end of ["pointerup", "pointercancel"]) addEventListener(end, () => setTimeout(letGo)); // a change event comes first, if any
     listen("blur", { [id]: letGo });
     listen("change", { [id]: () => { letGo(); toldTo({ do: id, percent: numberIn(id) }); } });
   }
@@ -249,7 +249,7 @@ export function printPanel() {
   listen("click", { emergency: stop });
   hearKey(window);
   $("print-page").addEventListener("load", () => hearKey($("print-page").contentWindow));
-  onNew(({ sliced, gcode }) => [sliced?.key, sliced?.stale, gcode?.key], () => { unforce(); problem(""); }); // what was found of others
+  onNew(({ sliced, gcode }) => [sliced?.key, sliced?.stale, gcode?.key], () => { unforce(); problem(""); }); // results of another print
   onNew(({ gcode }) => gcode, (gcode) => {
     hide({ "gcode-line": !gcode });
     if (gcode) $("tab-printing").click();
@@ -274,9 +274,9 @@ function refused({ problem: text, forcible }) {
   if (forcible) hide({ "force-line": false });
 }
 
-const SAME_PRESS_MS = 1000; // who presses twice in a fright means the print of the first time
+const SAME_PRESS_MS = 1000; // a repeated press within this time means the same print
 
-/** Emergency stops, and in the bar at the foot, which nothing covers, what has become of them, until a person has noted it. */
+/** Emergency stops and, in the bar at the foot, which nothing covers, their outcome, until the user has dismissed it. */
 function stopsAsked(prints, send, isOpen) {
   let asked = new Set(), late = 0, pressed = { number: 0, at: -Infinity };
   const going = ({ is_over: over }) => !over;
@@ -301,7 +301,7 @@ function stopsAsked(prints, send, isOpen) {
       clearTimeout(late);
       late = setTimeout(doubt, ANSWER_MS);
     },
-    /** One has waited too long for a line, or its print is not there any more. */
+    /** A stop has waited too long for a connection, or its print no longer exists. */
     expired: () => { if (stopped().some(going)) say("THE STOP HAS NOT ARRIVED and is not given any more: press it again, or use the machine's own switch."); },
     told: () => { if (stopped().length && !stopped().some(going)) say(stopped().map(({ name, sentence }) => `${name}: ${sentence}.`).join(" ")); },
   };

@@ -1,11 +1,11 @@
-// Print shown: a print's checks, its progress and its end, the bar on every tab, what is told outside the page, and its printer: by hand, by its camera, in a graph.
+// Print shown: a print's checks, progress and end, the bar on every tab, notifications outside the page, and its printer: manual control, camera, temperature graph.
 
 import { $, clock, duration, hide, listIn, moment, onData, optionsOf, putNew, putTable, rowOf, tell, tellIn } from "../../../../view/template/elements.js";
 import { keptInTab } from "../store.js";
 
-const SILENT_MS = 5000; // a print that goes on is told five times a second
+const SILENT_MS = 5000; // a running print is reported five times a second
 const FEW = 8;
-const HEARD = new Map(); // by the number of a print: what was heard of it last, and when
+const HEARD = new Map(); // by the number of a print: its last report, and the time
 let shownState = "";
 
 const IN_HAND = "manual control";
@@ -17,7 +17,7 @@ export function hear(prints) {
   }
 }
 
-/** That a print which goes on has not been heard of for a while: it may hang, or what lies between; "" where it has. */
+/** A warning that a running print has not been reported for a while: it or the connection may hang; "" otherwise. */
 export function silence({ number, is_over: over, live }) {
   const past = performance.now() - (HEARD.get(number)?.at ?? Infinity);
   return !over && live && past > SILENT_MS ? `nothing heard of it for ${Math.floor(past / 1000)} s` : "";
@@ -60,7 +60,7 @@ export function showPrint(print, commands) {
   if (over && print.forcible && commands) hide({ "force-line": false });
 }
 
-/** How long ago a moment was, in seconds since 1970. */
+/** Time since a moment, which is given in seconds since 1970. */
 function ago(moment_s) {
   const past_s = Math.max(0, Date.now() / 1000 - moment_s), [size, unit] = past_s < 60 ? [1, "s"] : past_s < 3600 ? [60, "min"] : [3600, "h"];
   return `${Math.floor(past_s / size)} ${unit} ago`;
@@ -97,7 +97,7 @@ export function showHistory(prints = []) {
   putTable($("past-prints"), prints, ["print", "outcome", "time", "filament", "begun"], () => prints.map(({ cells, begun }) => rowOf([...cells, moment(begun)])));
 }
 
-/** The bar at the foot is there on every tab while anything prints; it is of the print that is looked at, where that runs. */
+/** The bar at the foot is on every tab while anything prints; it shows the selected print if that runs. */
 export function showBar(running, looked) {
   const shown = running.includes(looked) ? looked : running.at(-1);
   hide({ "bar-told": !shown, "emergency": !shown, "print-bar": !shown && $("stop-told").hidden });
@@ -107,21 +107,21 @@ export function showBar(running, looked) {
 }
 
 const titled = { name: "", share: null };
-const heard = new Map(); // whether it runs, by the number of a print that this page commands
+const heard = new Map(); // whether it runs, by the number of a print that this page controls
 
-/** The page's title is the name of the model, or of the G-code file that is shown; the tab's has it, too, and the share that is done of the newest print that runs; null: none runs. */
+/** The page's title is the name of the model, or of the shown G-code file; the tab's title has it, too, with the progress of the newest running print; null: none runs. */
 export function tellTitle(news) {
   const { name, share } = Object.assign(titled, news);
   tell({ title: name || "tiltprint" });
   document.title = [share == null ? "" : `${Math.floor(100 * share)} %`, name, "tiltprint"].filter(Boolean).join(" – ");
 }
 
-/** Asked as a print begins, for a hand has just pressed a button: may the browser say when it is over? */
+/** Request permission for notifications as a print begins, since browsers allow that only after a click. */
 export function askToNotify() {
   if (globalThis.Notification?.permission === "default" && globalThis.navigator?.userActivation?.isActive !== false) Notification.requestPermission();
 }
 
-/** Says of prints that this page commands that they are over, where the page itself is not seen. */
+/** Notify that prints that this page controls are over, where the page itself is not visible. */
 export function notifyOver(prints, page) {
   for (const { number, holder, is_over: over, is_printing: runs, name, sentence } of prints) {
     if (over && heard.get(number) && globalThis.Notification?.permission === "granted" && document.hidden !== false) {
@@ -131,7 +131,7 @@ export function notifyOver(prints, page) {
   }
 }
 
-/** A printer that is heated and moved from the page, with nothing printed. ask({does, ...}): what is to be done at it. */
+/** Manual control: the printer is heated and moved from the page, without a print. ask({does, ...}): send an action. */
 export function handPanel(ask) {
   onData("hand", ({ hand: does, keep }) => ask({ does, keep_heat: keep === "yes" }), $("hand-live"));
   onData("jog", ({ jog: [axis, way] }) => ask({ does: "jog", axis, by_mm: Number(`${way}${$("hand-step").value}`) }), $("hand-live"));
@@ -150,7 +150,7 @@ const EVERY_MS = 2000;
 export function webcamPanel(print) {
   const picture = $("webcam"), show = (whether) => hide({ "webcam-line": !whether });
   const filmed = () => (print()?.webcam && !print().is_over ? print().number : 0);
-  let asked = 0; // the print whose picture is there, or on its way
+  let asked = 0; // the print whose picture is loaded or requested
   Object.assign(picture, { onload: () => show(filmed() === asked), onerror: () => show(false) });
   setInterval(() => {
     if (!filmed()) return show(false);
@@ -160,14 +160,14 @@ export function webcamPanel(print) {
   }, EVERY_MS);
 }
 
-const KEPT_S = 600, WIDTH = 300, HEIGHT = 80; // of the drawing
+const KEPT_S = 600, WIDTH = 300, HEIGHT = 80; // size of the drawing
 const HEATS = ["nozzle", "bed", "nozzleTarget", "bedTarget"];
-const kept = keptInTab("heats", { samples: [] }); // a reload loses nothing of them
+const kept = keptInTab("heats", { samples: [] }); // they survive a reload
 export const SAMPLES = new Map(kept.now.samples); // by the number of a print: {at_s, nozzle, bed, nozzleTarget, bedTarget}, oldest first
 
 addEventListener("pagehide", () => kept.keep({ samples: [...SAMPLES] }));
 
-/** Keep what is told of the temperatures of prints, once each. */
+/** Keep the reported temperatures of prints, once each. */
 export function keepHeats(prints) {
   for (const number of SAMPLES.keys()) if (!prints.some((print) => print.number === number)) SAMPLES.delete(number);
   for (const { number, ...print } of prints) {
@@ -180,7 +180,7 @@ export function keepHeats(prints) {
   }
 }
 
-/** The ways of lines through samples, by name, in the drawing's own measure, and the greatest temperature, at its upper edge. */
+/** Paths of lines through samples, by name, in the drawing's coordinates, and the greatest temperature, at its upper edge. */
 export function heatLines(samples, now_s) {
   const values = samples.flatMap((sample) => HEATS.map((name) => sample[name])).filter((value) => value != null);
   const most = Math.max(50, 50 * Math.ceil(Math.max(0, ...values) / 50));
@@ -189,7 +189,7 @@ export function heatLines(samples, now_s) {
   return { most, lines: Object.fromEntries(HEATS.map((name) => [name, wayOf(name)])) };
 }
 
-/** Nozzle and bed of a print over the last ten minutes, with what they are to be, where there are two temperatures of it. */
+/** Nozzle and bed temperature of a print over the last ten minutes, with their targets, where there are two samples. */
 export function showHeats(print) {
   const samples = (print && SAMPLES.get(print.number)) || [];
   hide({ heat: samples.length < 2 });

@@ -12,7 +12,7 @@ import { store, subscribe, update } from "../store.js";
 import { brushOf, measureOf } from "./tools.js";
 import { met } from "./triangles.js";
 
-/** Of what a click can be for: the button that asks for it, what is said then, and what it does where it meets the model. */
+/** Uses of a click: the button that requests it, the notice, and the action where it meets the model. */
 const WANTED = {
   lay: ["lay", () => "Click a lit face: it can rest on that."], snap: ["snap", () => "Click the face whose plane it is to take.", ({ face }, picture) => snapTo(face, picture)],
   limb: ["limb", () => "Click the limb above the plane that is to come off alone; the others stay.", ({ place }) => cutLimb(place)],
@@ -34,7 +34,7 @@ export function clicksOf() {
   });
 }
 
-/** The part that is seen where an event is; 0: none. */
+/** The part visible at an event; 0: none. */
 function partMet(event, picture) {
   const { tab, state, pieces, apart } = store;
   if (apartNow()) return pieceMet(pieces, shiftsOf(pieces, apart), picture.sight(event));
@@ -42,7 +42,7 @@ function partMet(event, picture) {
   return spot ? partAt(spot.place) : 0;
 }
 
-/** What hands do on the canvas, for `handle`; a double click brings the place into the middle, and Enter does there what a click would. */
+/** Pointer actions on the canvas, for `handle`; a double click centres the place, and Enter does there what a click would. */
 export function handsOf(camera, picture) {
   const canvas = $("canvas"), brush = brushOf(picture), measure = measureOf(picture);
   const widen = (by) => () => {
@@ -71,7 +71,7 @@ export function handsOf(camera, picture) {
   const clickAll = (...ids) => () => ids.forEach((id) => $(id).click());
   onKeys({ b: clickAll("tab-parts", "mark-brush"), m: clickAll("measure"), x: nextSection, "[": widen(1 / 1.2), "]": widen(1.2) },
     () => $("keys").open || !store.triangles || document.activeElement?.closest("[data-typing]"));
-  globalThis.view = { camera, picture }; // for whoever tries the page from a console
+  globalThis.view = { camera, picture }; // for experiments in a browser's console
   const asked = (event) => {
     const part = store.clicks ? 0 : partMet(event, picture);
     if (part) openMenu(part, event.clientX, event.clientY);
@@ -79,7 +79,7 @@ export function handsOf(camera, picture) {
   return { changed: picture.ask, pressed: clicked, asked, take: brush.take };
 }
 
-/** A click on the model is used by the active tool; without one it chooses a part, or none beside the model. */
+/** The active tool uses a click on the model; without a tool it selects a part, or none beside the model. */
 function press(event, picture) {
   const { clicks, tab } = store;
   if (!clicks || apartNow()) return void (tab === "parts" && choosePart(partMet(event, picture)));
@@ -89,12 +89,12 @@ function press(event, picture) {
 }
 
 const REACH_PX = 26;
-/** Of every end of an axis: its direction, and from where it is looked at, yaw and pitch in degrees. */
+/** For each end of an axis: its direction, and yaw and pitch in degrees of the view from there. */
 const ENDS = {
   "x": [[1, 0, 0], [0, 0]], "-x": [[-1, 0, 0], [180, 0]], "y": [[0, 1, 0], [90, 0]], "-y": [[0, -1, 0], [-90, 0]], "z": [[0, 0, 1], [-90, 89.5]], "-z": [[0, 0, -1], [-90, -89.5]],
 };
 
-/** The cross, drawn with the picture; a click turns the view. */
+/** The axes, drawn with the picture; a click turns the view. */
 export function axesOf(camera, picture) {
   const group = $("axes");
   const ends = Object.fromEntries([...group.querySelectorAll("[data-end]")].map((end) => [end.dataset.end, end]));
@@ -117,8 +117,8 @@ export function axesOf(camera, picture) {
       ends[name].setAttribute("transform", `translate(${place})`);
       $(`axis-${name}`)?.setAttribute("d", `M0 0L${place}`);
     }
-    const order = Object.keys(ENDS).sort((a, b) => near(a) - near(b)); // those behind first
-    if (group.dataset.order === order.join() || group.contains(document.activeElement)) return; // moved, an end would lose the keyboard
+    const order = Object.keys(ENDS).sort((a, b) => near(a) - near(b)); // farthest first
+    if (group.dataset.order === order.join() || group.contains(document.activeElement)) return; // moving an end would take the keyboard focus from it
     group.dataset.order = order.join();
     group.append(...order.map((name) => ends[name]));
   });
@@ -132,7 +132,7 @@ export function sectionView(picture) {
     picture.section(store.triangles ? sectionAsked(picture.box(), cut) : null);
   };
   listen("input", { "section-at": show });
-  const open = () => { // towards the eye
+  const open = () => { // towards the camera
     $("section-at").value = 0;
     $("section-flip").checked = false;
     show();

@@ -1,17 +1,17 @@
-// Face tree: boxes within boxes around triangles, by which the face under a finger and the faces around a place are found in a large model, too.
+// Face tree: bounding volume hierarchy over triangles; finds the face under the pointer and the faces around a point, also in large models.
 
 import { bounds, cross, dot, length, sub } from "../../../../view/template/picture/math.js";
 
-const LEAF = 8; // faces in one of the smallest boxes
-const CELLS = 1024; // along each axis, in which faces are sorted
-const EDGE_SLACK = 1e-9; // of a triangle's side: a ray along an edge, as one through the middle of a square, would slip between two faces by rounding
+const LEAF = 8; // faces in a leaf
+const CELLS = 1024; // grid cells along each axis, by which faces are sorted
+const EDGE_SLACK = 1e-9; // share of a triangle's side: by rounding, a ray along an edge, as one through the middle of a square, would slip between two faces
 const AXES = [0, 1, 2];
-const trees = new WeakMap(); // by the corners of the faces
+const trees = new WeakMap(); // by the array of the faces' corners
 
 export const cornersAt = (corners, face) => [0, 3, 6].map((k) => [corners[9 * face + k], corners[9 * face + k + 1], corners[9 * face + k + 2]]);
 const middleOf = (corners, face) => AXES.map((axis) => (corners[9 * face + axis] + corners[9 * face + 3 + axis] + corners[9 * face + 6 + axis]) / 3);
 
-/** {order: the faces along a Morton curve, boxes: six numbers a node of a complete binary tree from 1 on, over leaves of LEAF faces}. */
+/** {order: the faces along a Morton curve, boxes: six numbers for each node of a complete binary tree, numbered from 1, over leaves of LEAF faces}. */
 function treeOf({ corners, count }) {
   if (trees.has(corners)) return trees.get(corners);
   const leaves = 2 ** Math.ceil(Math.log2(Math.max(count / LEAF, 1))), order = new Float64Array(count), [least, most] = bounds(corners);
@@ -35,7 +35,7 @@ function treeOf({ corners, count }) {
   return trees.get(corners);
 }
 
-/** act(face) for all faces in the smallest boxes that a test lets pass, and with them all that they lie in: test(least corner, greatest corner). */
+/** Call act(face) for all faces in the leaves that pass a test, with all boxes around them: test(least corner, greatest corner). */
 function visit({ order, boxes, leaves }, test, act) {
   for (const waiting = [1]; waiting.length; ) {
     const node = waiting.pop();
@@ -45,14 +45,14 @@ function visit({ order, boxes, leaves }, test, act) {
   }
 }
 
-/** How far along a ray it meets a triangle (Moeller and Trumbore); Infinity: nowhere. */
+/** Distance along a ray at which it meets a triangle (Moeller and Trumbore); Infinity: it does not. */
 function farTo([a, b, c], from, along) {
   const one = sub(b, a), other = sub(c, a), across = cross(along, other), turn = dot(one, across), to = sub(from, a), beyond = cross(to, one);
   const u = dot(to, across) / turn, v = dot(along, beyond) / turn, far = dot(other, beyond) / turn;
   return Math.abs(turn) >= 1e-12 && u >= -EDGE_SLACK && v >= -EDGE_SLACK && u + v <= 1 + EDGE_SLACK && far > 0 ? far : Infinity;
 }
 
-/** {face: the first of {corners, count} that a ray meets, -1: none, far: how many times `along` from its beginning}, in the frame of the triangles. */
+/** {face: the first of {corners, count} that a ray meets, -1: none, far: the distance in units of `along`}, in the frame of the triangles. */
 export function faceMet(shape, from, along) {
   const met = { face: -1, far: Infinity };
   const pierced = (low, high) => {
@@ -66,14 +66,14 @@ export function faceMet(shape, from, along) {
   return met;
 }
 
-/** A set of faces: one, and those connected with it whose middles lie within so many mm of a place. */
+/** A set of faces: one, and those connected with it whose middles are within a distance in mm of a point. */
 export function facesAround(triangles, face, place, radius) {
-  const { corners, faces } = triangles, found = new Set([face]), near = new Map(); // by a vertex
+  const { corners, faces } = triangles, found = new Set([face]), near = new Map(); // near: faces by vertex
   const put = (k) => faces.subarray(3 * k, 3 * k + 3).forEach((vertex) => (near.get(vertex) || near.set(vertex, []).get(vertex)).push(k));
   put(face);
   visit(treeOf(triangles), (low, high) => AXES.every((axis) => place[axis] >= low[axis] - radius && place[axis] <= high[axis] + radius), (k) => {
     if (length(sub(middleOf(corners, k), place)) <= radius) put(k);
   });
-  for (const k of found) for (const vertex of faces.subarray(3 * k, 3 * k + 3)) near.get(vertex).forEach((next) => found.add(next)); // a set goes on with what comes in meanwhile
+  for (const k of found) for (const vertex of faces.subarray(3 * k, 3 * k + 3)) near.get(vertex).forEach((next) => found.add(next)); // iteration includes faces added meanwhile
   return found;
 }

@@ -1,4 +1,4 @@
-// Grip: what in the picture a hand, a finger or arrow keys take hold of, follow and let go.
+// Grip: things in the picture that a pointer or arrow keys take hold of, move and release.
 
 import { $ } from "../../../../view/template/elements.js";
 import { add } from "../../../../view/template/picture/math.js";
@@ -35,15 +35,15 @@ export function gripOf(element, { take, hold, put, drop, step }) {
   const letGo = () => { if (stepping) [stepping] = [false, put()]; };
   element.addEventListener("keyup", (event) => { if (event.key in ARROWS) letGo(); });
   element.addEventListener("blur", letGo);
-  element.addEventListener("wheel", (event) => { // the view is zoomed here, too
+  element.addEventListener("wheel", (event) => { // the wheel zooms the view here, too
     event.preventDefault();
     $("canvas").dispatchEvent(new WheelEvent("wheel", event));
   }, { passive: false });
 }
 
-const LEAST_PIXELS = 0.5; // of a mm along a way: seen head on, what is held would jump
+const LEAST_PIXELS = 0.5; // smallest size of a mm along a direction: seen head on, a handle would jump
 
-/** later(event): how many mm a hand has gone along a way since it took hold of a place; null where that is not seen. */
+/** later(event): mm that the pointer has moved along a direction since it grabbed a point; null where that cannot be seen. */
 export function alongWay(picture, place, way, event) {
   const from = picture.placeOf(place), to = picture.placeOf(add(place, way));
   if (!from || !to) return null;

@@ -10,13 +10,13 @@ import { piecesOn } from "../parts/pieces.js";
 import { paintedRed, planeBefore, standingBy } from "./triangles.js";
 
 const MODEL_COLOUR = [176, 184, 194], PEDESTAL_COLOUR = [146, 150, 156], PLANE_COLOUR = [30, 120, 190];
-const FAINT = 0.14; // how much is seen, face on, of a model that is being sliced
-const MOST_FACES = 2000000; // of all copies together; those beyond are drawn as boxes
-const LOST = { count: 0, hues: new Float32Array(RED.map((x) => x / 255)) }; // the look of what has no place on the plate
+const FAINT = 0.14; // opacity, face on, of a model that is being sliced
+const MOST_FACES = 2000000; // limit for all copies together; copies beyond it are drawn as boxes
+const LOST = { count: 0, hues: new Float32Array(RED.map((x) => x / 255)) }; // the look of bodies that have no room on the plate
 const ON_SECTION_MM = 1e-3;
-const ON_FACES = 1e-4; // in depth, by which lines are seen before what they lie on, and what is cut away before the plate
+const ON_FACES = 1e-4; // depth offset that shows lines before their surfaces, and removed bodies before the plate
 
-/** Corners of boxes about all that is drawn but the table, the model in the middle of that: the model and its copies, or its parts, and walls, planes, marks and what is in the way. */
+/** Corners of boxes around everything drawn except the table, relative to the model's middle: the model and its copies, or its parts, and walls, planes, marks and obstacles. */
 export function placesDrawn({ box, place = [0, 0, 0], middle = place, copies = [], pieces, shifts, walls, pedestal, others, extras }) {
   const shifted = (box, shift) => box.map((corner) => add(corner, shift));
   const stood = () => [
@@ -30,14 +30,14 @@ export function placesDrawn({ box, place = [0, 0, 0], middle = place, copies = [
   return [...whole.filter((box) => box.length).flatMap(cornersOf), ...around];
 }
 
-/** Drawings of the walls of parts, by the walls; those that were there before are kept. */
+/** Drawings of the walls of parts, by the walls; existing ones are kept. */
 function wallsOn(gl, walls, before = new Map()) {
   const kept = new Map([...(walls || []).values()].map((wall) => [wall, before.get(wall) || solidOf(gl, wall)]));
   before.forEach((drawing, wall) => { if (!kept.has(wall)) drawing.free(); });
   return kept;
 }
 
-/** Drawing for things [{solid, lines, matrix, strength, over: before all else}]. */
+/** Drawing for things [{solid, lines, matrix, strength, over: in front of everything}]. */
 function thingsOn(gl, things) {
   const bodies = things.map(({ solid, lines, matrix = IDENTITY, ...look }) => ({ body: bodyOf(gl, { solid, lines }), matrix, look: { ...look, lift: ON_FACES } }));
   return {
@@ -46,7 +46,7 @@ function thingsOn(gl, things) {
   };
 }
 
-/** The picture of the bench, drawn with the browser's next frame; `drawn`: functions called after each frame. null without WebGL2. */
+/** The picture of the bench, drawn in the browser's next frame; `drawn`: functions called after each frame. null without WebGL2. */
 export function pictureOf(canvas, camera) {
   const gl = cardOf(canvas);
   if (!gl) return null;
@@ -54,13 +54,13 @@ export function pictureOf(canvas, camera) {
     model: null, matrix: IDENTITY, place: [0, 0, 0], middle: [0, 0, 0], copies: [], box: [[-60, -60, 0], [60, 60, 60]], cuts: null, red: null, marks: null, pieces: null, shifts: [], chosen: 0,
     walls: null, section: null, pedestal: null, others: null, machine: null, dark: false, lost: false, extras: {},
   };
-  const drawn = [], toldOf = {}, stale = new Map(); // by the name of what is to be made anew before it is drawn: whether its colours alone are others
+  const drawn = [], toldOf = {}, stale = new Map(); // stale: by name of a drawing to rebuild before the next frame, whether only its colours differ
   let card = {}, frame = null, colours = null, count = 0, placed = "";
   const inks = {
     model: () => markedOver(scene.marks, paintedRed(scene.model.count, scene.red, MODEL_COLOUR, colours)),
     pieces: () => scene.chosen,
   };
-  /** What makes what the card holds, of what the scene has, by its name; more: extras. */
+  /** Makers of the drawings on the card from the scene, by name; with extras. */
   const makers = {
     table: () => bodyOf(gl, scene.machine ? bodiesOf(scene.machine, scene.dark).table : {}),
     model: () => scene.model && solidOf(gl, { places: scene.model.corners, colours: inks.model() }),
@@ -88,7 +88,7 @@ export function pictureOf(canvas, camera) {
     if (outgrown(canvas)) [canvas.width, canvas.height] = size;
     frame.begin(...size);
     if (!below) card.table.draw(ground, { lift: ON_PLATE });
-    const apart = scene.shifts.some((shift) => shift.some(Boolean)); // the first model alone
+    const apart = scene.shifts.some((shift) => shift.some(Boolean)); // only the first model
     if (card.pieces && !scene.walls) for (const place of [[0, 0, 0], ...(apart ? [] : scene.copies)]) card.pieces.draw((shift) => seenAs(moved(add(place, shift))), scene.shifts, capped);
     else if (card.model) {
       card.walls.forEach((wall) => wall.draw(ground, open));
@@ -110,13 +110,13 @@ export function pictureOf(canvas, camera) {
     stale.set(name, coloursAlone && (stale.get(name) ?? true));
     ask();
   };
-  /** Another value of the scene, and what the card has of it anew. */
+  /** Set a value of the scene and rebuild its drawing. */
   const take = (key, name = key, coloursAlone = false) => (value) => {
     if (value === scene[key]) return;
     scene[key] = value;
     anew(name, coloursAlone);
   };
-  /** More to draw under a name: things(), see thingsOn, made where what it tells is new. */
+  /** Draw further things under a name: things(), see thingsOn, rebuilt when their text `told` differs. */
   const extra = (name, told, things) => {
     if ((toldOf[name] ?? "") === told) return;
     toldOf[name] = told;
@@ -124,7 +124,7 @@ export function pictureOf(canvas, camera) {
     makers[name] = () => thingsOn(gl, scene.extras[name]);
     anew(name);
   };
-  /** The model alone, drawn into a corner of the canvas and taken from there before that is seen. */
+  /** The model alone, drawn into a corner of the canvas and copied before that is visible. */
   const thumbnail = (rows, into) => {
     const { matrix, box } = standingBy(rows, scene.model.vertices, 0), eye = cameraOf(), { width, height } = into;
     eye.fit(cornersOf(box), [width, height]);
@@ -154,30 +154,30 @@ export function pictureOf(canvas, camera) {
     },
     stand: ({ matrix, box }) => { Object.assign(scene, { matrix, box }); ask(); },
     red: take("red", "model", true),
-    /** A byte of each face: the kinds of zones it is marked for. */
+    /** One byte for each face: the kinds of zones for which it is marked. */
     marks: take("marks", "model", true),
     cut: (planes, colours) => {
       const drawable = planes && planes.length <= MOST_CUTS;
       scene.cuts = drawable ? cutsOf({ planes: planes.map((plane) => planeBefore(plane, scene.matrix)), colours }) : null;
       ask();
     },
-    /** The parts as bodies of their own, each shifted, in place of the model; chosen: the number of the part that stands out, 0: all. */
+    /** The parts as bodies of their own, each shifted, instead of the model; chosen: the number of the highlighted part, 0: all. */
     pieces: (found, shifts, chosen) => {
       if (scene.pieces !== found) anew("pieces");
       else if (found && scene.chosen !== chosen) anew("pieces", true);
       Object.assign(scene, { pieces: found, shifts, chosen });
       ask();
     },
-    /** The walls of what is sliced, triangles of each part, with the model and its copies as ghosts about them; null: none. */
+    /** The walls of sliced parts, triangles for each part, with the model and its copies as ghosts around them; null: none. */
     walls: take("walls"),
-    /** The plane in hand {normal, centre_mm, radius_mm, invalid} in the platform's frame, or none. */
+    /** The dragged plane {normal, centre_mm, radius_mm, invalid} in the build plate's frame, or none. */
     plane: (plane) => extra("plane", plane ? JSON.stringify(plane) : "", () => {
       const { discs, rims } = planesOf(plane ? [{ base: plane, direction: plane.normal }] : [], () => (plane.invalid ? RED : PLANE_COLOUR));
-      return [{ solid: discs, strength: 0.3 }, { solid: discs, lines: rims, strength: 0.2, over: true }]; // its outline and a veil are seen through the model
+      return [{ solid: discs, strength: 0.3 }, { solid: discs, lines: rims, strength: 0.2, over: true }]; // its outline and a translucent disc are visible through the model
     }),
-    /** The triangles of what the model stands on, in the platform's frame, and of the other models, from the middle of all, or none. */
+    /** The triangles of the model's pedestal, in the build plate's frame, and of the other models, relative to the middle of all, or none. */
     pedestal: take("pedestal"), others: take("others"),
-    /** Where the middle of all that is drawn but the walls and the other models stands on the plate, its copies, from there, and the middle of all; lost: copies and others have no place there. */
+    /** Position on the plate of the middle of everything drawn except walls and other models, its copies relative to it, and the middle of all; lost: copies and other models have no room there. */
     place(place, copies, middle, lost) {
       const told = JSON.stringify([place, copies, middle, lost, scene.box]);
       if (told === placed) return;
@@ -187,29 +187,29 @@ export function pictureOf(canvas, camera) {
       extra("copies", boxes.length ? told : "", () => (boxes.length ? [{ lines: trianglesOf([{ corners: boxes, colour: [...MODEL_COLOUR, 255] }]) }] : []));
       ask();
     },
-    /** Where a place of the platform's frame is seen, in CSS pixels of the canvas; null behind the eye. */
+    /** The position of a point of the build plate's frame, in CSS pixels of the canvas; null behind the camera. */
     placeOf: (place) => {
       const [x, y, , w] = scene.toClip ? projected(scene.toClip, place) : [0, 0, 0, 0];
       return w > 0 ? [(x + 1) / 2 * canvas.clientWidth, (1 - y) / 2 * canvas.clientHeight] : null;
     },
-    /** The plane above which all is cut away, in the frame of the platform, or none. */
+    /** The plane above which everything is cut off, in the build plate's frame, or none. */
     section: (plane) => {
       if (!alike(plane, scene.section)) ask();
       scene.section = plane;
     },
     cutAway: (place) => Boolean(scene.section) && dot(scene.section.normal, place) > scene.section.offset_mm + ON_SECTION_MM,
-    /** A place of that frame into the middle of the picture. */
+    /** Centre the view on a point of that frame. */
     look: (place) => {
       camera.target = add(place, scene.place);
       ask();
     },
     eye: () => sub(camera.eye(), scene.place),
-    /** mm that a pixel shows at a place. */
+    /** Size of a pixel in mm at a point. */
     pixelAt: (place) => (2 * HALF_HEIGHT * length(sub(camera.eye(), add(place, scene.place)))) / canvas.clientHeight,
     carried: (place) => carried(scene.matrix, place),
     box: () => scene.box,
     matrix: () => scene.matrix,
-    /** Small pictures of the model as it would stand by rows of rotations, [[rows, canvas of two dimensions]]. */
+    /** Thumbnails of the model, oriented by rows of rotations: [[rows, 2D canvas]]. */
     thumbnails: (wanted) => {
       if (gl.isContextLost() || !scene.model) return;
       renew();
@@ -217,18 +217,18 @@ export function pictureOf(canvas, camera) {
       wanted.forEach(([rows, into]) => thumbnail(rows, into));
       anew("model", true);
     },
-    /** All that is drawn brought into view, and other places. */
+    /** Fit the view to everything drawn and to further points. */
     fit: (others = []) => {
       camera.fit([...placesDrawn(scene), ...others].map((place) => add(place, scene.place)), sizeOf(canvas));
       ask();
     },
-    /** From where, at the section if there is one, and along what an event on the canvas looks, in the frame of the platform, the model in its middle. */
+    /** The ray of an event on the canvas in the build plate's frame, with the model in its middle; it begins at the section if there is one. */
     sight(event) {
       const [eye, along] = camera.sight(placeOn(canvas, event)), from = sub(eye, scene.place), { normal, offset_mm: offset } = scene.section || {};
       const far = this.cutAway(from) ? (offset - dot(normal, from)) / dot(normal, along) : 0;
       return [far >= 0 ? add(from, scaled(along, far)) : from, along];
     },
-    /** The same in the frame of the model as it is read. */
+    /** The ray of an event in the frame of the model as it is read. */
     ray(event) {
       const back = undone(scene.matrix), [eye, along] = this.sight(event);
       return [carried(back, eye), turned(back, along)];

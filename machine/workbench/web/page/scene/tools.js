@@ -1,4 +1,4 @@
-// Tools: the brush, which marks or erases faces, one undo step for each stroke; and the measure: distance of two points and angle of their faces.
+// Tools: the brush, which marks or erases faces, one undo step for each stroke; and the measuring tool: distance of two points and angle of their faces.
 
 import { $, hide, numberIn, tell } from "../../../../view/template/elements.js";
 import { add, dot, length, mix, RAD, scaled, sub, turned } from "../../../../view/template/picture/math.js";
@@ -9,7 +9,7 @@ import { store, subscribe, update } from "../store.js";
 import { cornersAt, facesAround } from "./face-tree.js";
 import { met } from "./triangles.js";
 
-const STEP_PIXELS = 8; // along a stroke, from one circle of the brush to the next
+const STEP_PIXELS = 8; // distance along a stroke between two circles of the brush
 const ERASER = [110, 116, 126]; // the circle's colour
 
 /** Numbers as ranges, as the server reads them: "0-11 15". */
@@ -18,7 +18,7 @@ function rangesOf(numbers) {
   return ends.map((end, k) => `${sorted[k ? ends[k - 1] + 1 : 0]}-${sorted[end]}`).join(" ");
 }
 
-/** {take(event): a stroke as `handle` holds it, null: there is nothing to paint; hover(event): the circle under a hand, null: none}. */
+/** {take(event): a stroke as `handle` holds it, null: nothing to paint; hover(event): the circle under the pointer, null: none}. */
 export function brushOf(picture) {
   let stroke = null; // {kind, bit, erases, marks: before it, faces: those that it changes, last: the newest event}
   const radius = () => numberIn("brush-radius"), erasing = (event) => event.shiftKey || event.button === 2 || $("mark-erase").getAttribute("aria-pressed") === "true";
@@ -68,7 +68,7 @@ const SNAP_PIXELS = 6;
 const LABEL = [26, -34]; // pixels from the middle of the line to the label's corner
 const PARALLEL = 1 - 1e-6; // cosine between normals
 
-/** Where an event meets the model; at a vertex that is seen close by, if there is one. */
+/** The point of the model under an event; snapped to a vertex that is close by on the screen. */
 function pointAt(event, picture) {
   const spot = met(event, picture);
   if (!spot) return null;
@@ -79,7 +79,7 @@ function pointAt(event, picture) {
   return far(nearest) <= SNAP_PIXELS ? { at: nearest, vertex: true } : spot;
 }
 
-/** The lines of text for two points in the frame of the platform. */
+/** The text lines for two points in the build plate's frame. */
 function inWords([a, b], [from, to]) {
   const way = sub(to, from), cosine = Math.min(Math.abs(dot(a.normal || [0, 0, 0], b.normal || [0, 0, 0])), 1), planes = !a.vertex && !b.vertex;
   const texts = [`${length(way).toFixed(2)} mm`, way.map((x, k) => `Δ${"XYZ"[k]} ${x.toFixed(2).replace("-", "−")}`).join("  ")];
@@ -88,7 +88,7 @@ function inWords([a, b], [from, to]) {
   return texts.join("\n");
 }
 
-/** {press(event): the next point, hover(event): one that could be}, drawn over the picture while points are clicked. */
+/** {press(event): the next point, hover(event): a preview}, drawn over the picture while points are clicked. */
 export function measureOf(picture) {
   let points = [], candidate = null;
   const change = (taken, next) => {

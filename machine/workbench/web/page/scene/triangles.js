@@ -1,4 +1,4 @@
-// Triangles: the model as it is read, and what of it overhangs for a rotation.
+// Triangles: the model as it is read, and its overhangs for a rotation.
 
 import { add, bounds, carried, cross, dot, length, mix, multiply, RAD, rotated, scaled, sub, turned, undone } from "../../../../view/template/picture/math.js";
 import { RED, wordOf } from "../../../../view/template/picture/shapes.js";
@@ -6,7 +6,7 @@ import { apartNow } from "../parts/pieces.js";
 import { store } from "../store.js";
 import { cornersAt, faceMet } from "./face-tree.js";
 
-/** {vertices, faces, corners: places of the triangles' corners, normals, areas, reach_mm: of the farthest vertex from the middle} of the server's bytes. */
+/** {vertices, faces, corners: coordinates of the triangles' corners, normals, areas, reach_mm: distance of the farthest vertex from the middle} decoded from the server's bytes. */
 export function trianglesFrom(buffer) {
   const [points, count] = new Uint32Array(buffer, 0, 2);
   const vertices = new Float32Array(new Float64Array(buffer, 8, 3 * points)), faces = new Uint32Array(buffer, 8 + 24 * points, 3 * count);
@@ -23,7 +23,7 @@ export function trianglesFrom(buffer) {
   return { vertices, faces, corners, normals, areas, count, reach_mm: reach };
 }
 
-/** Which faces overhang too far when a direction points up, and their area; what lies on the platform does not. */
+/** Faces that overhang too far when a direction points up, and their area; faces on the build plate do not count. */
 export function overhanging({ vertices, faces, normals, areas, count }, up, limit, platform) {
   const [x, y, z] = up, heights = new Float32Array(vertices.length / 3), red = new Uint8Array(count);
   let least = Infinity, area = 0;
@@ -41,7 +41,7 @@ export function overhanging({ vertices, faces, normals, areas, count }, up, limi
   return { red, area };
 }
 
-/** Colours of all corners, the faces that are marked red. */
+/** Colours of all corners, with the marked faces red. */
 export function paintedRed(count, red, colour, into = new Uint8Array(12 * count)) {
   const words = new Uint32Array(into.buffer), plain = wordOf(colour, 254), marked = wordOf(RED);
   for (let face = 0, k = 0; face < count; face++, k += 3) words[k] = words[k + 1] = words[k + 2] = red && red[face] ? marked : plain;
@@ -50,7 +50,7 @@ export function paintedRed(count, red, colour, into = new Uint8Array(12 * count)
 
 export const normalAt = ({ normals }, face) => [0, 1, 2].map((k) => normals[3 * face + k]);
 
-/** Where an event meets the model, {face, normal, at} in its own frame, `place` in that of the platform; null: nowhere, or on its inside, in a section. */
+/** The point of the model under an event: {face, normal, at} in the model's frame, `place` in the build plate's; null: none, or an inner side in a section. */
 export function met(event, picture) {
   const { triangles } = store, [from, along] = picture.ray(event), { face, far } = triangles && !apartNow() ? faceMet(triangles, from, along) : { face: -1 };
   if (face < 0) return null;
@@ -58,7 +58,7 @@ export function met(event, picture) {
   return picture.cutAway(place) || (picture.cutAway(picture.eye()) && dot(normal, along) > 0) ? null : { face, normal, at, place };
 }
 
-/** The matrix that turns the model by rows of a rotation, sets it on a pedestal so high, 0 the platform, and centres it. */
+/** The matrix that turns the model by rows of a rotation, sets it on a pedestal of a height (0: on the build plate), and centres it. */
 export function standingBy(rows, vertices, lift) {
   const [a, b, c] = rows, least = [Infinity, Infinity, Infinity], most = [-Infinity, -Infinity, -Infinity];
   for (let i = 0; i < vertices.length; i += 3)
@@ -72,14 +72,14 @@ export function standingBy(rows, vertices, lift) {
   return { matrix, box: [add(least, shift), add(most, shift)] };
 }
 
-/** Rows of a rotation: turns about x, then y, then z, degrees, after another rotation. */
+/** Rows of a rotation: turns about x, then y, then z, in degrees, after another rotation. */
 export function turnedFurther(rows, [x, y, z]) {
   const turn = multiply(rotated([0, 0, 1], z * RAD), multiply(rotated([0, 1, 0], y * RAD), rotated([1, 0, 0], x * RAD)));
   const columns = [0, 1, 2].map((k) => turned(turn, rows.map((row) => row[k])));
   return [0, 1, 2].map((k) => columns.map((column) => column[k]));
 }
 
-/** A plane of the platform's frame in the frame of the model as it is read. */
+/** A plane, given in the build plate's frame, in the frame of the model as read. */
 export function planeBefore({ normal, offset_mm: offset }, matrix) {
   return { normal: turned(undone(matrix), normal), offset_mm: offset - dot(normal, matrix.slice(12, 15)) };
 }
@@ -88,7 +88,7 @@ export function planeBefore({ normal, offset_mm: offset }, matrix) {
 export function sectionOf({ corners, count }, plane, later, matrix) {
   const heights = (place, { normal, offset_mm: offset }) => dot(normal, place) - offset, found = [];
   const own = planeBefore(plane, matrix), [x, y, z] = own.normal, high = [0, 0, 0];
-  for (let face = 0, at = 0; face < count; face++, at += 9) { // most faces lie on one side, so nothing is made for them
+  for (let face = 0, at = 0; face < count; face++, at += 9) { // most faces are on one side, so nothing is allocated for them
     for (let k = 0, i = at; k < 3; k++, i += 3) high[k] = corners[i] * x + corners[i + 1] * y + corners[i + 2] * z - own.offset_mm;
     if (high[0] > 0 === high[1] > 0 && high[1] > 0 === high[2] > 0) continue;
     const around = cornersAt(corners, face);

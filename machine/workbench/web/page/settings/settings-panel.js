@@ -1,16 +1,16 @@
-// Settings panel: the keys of the profile in groups, by level and search, of all parts or of one; changes are marked and can be reset.
+// Settings panel: the keys of the profile in groups, by level and search, for all parts or one; changes are marked and can be reset.
 
 import { $, button, disable, hide, listen, made, numberIn, optionsOf, pressed, putNew, putRows, tell } from "../../../../view/template/elements.js";
 import { ask, newest, send } from "../line.js";
 import { keptInTab, onNew, onState, store } from "../store.js";
 
-const LEVELS = ["simple", "advanced", "all"]; // each has the keys of those before it
+const LEVELS = ["simple", "advanced", "all"]; // each includes the keys of the previous ones
 const KINDS = ["machine", "material", "process"];
 const KIND_OF = { machine: "machine", material: "material", process: "process", search: "process" };
 const kept = keptInTab("settings", { level: "simple", folded: [] });
 
 export function settingsPanel() {
-  const wrongs = new Map(); // key -> {text, typed}: what was refused last, told beside its field
+  const wrongs = new Map(); // key -> {text, typed}: the last refusal, shown beside its field
   const explained = new Set();
   let settings = [], changedOnly = false;
   const part = () => numberIn("settings-part") || 0;
@@ -25,7 +25,7 @@ export function settingsPanel() {
       } else if (wrongs.delete(key)) fetchAll();
     });
   };
-  /** What is refused stands beside its field, whatever is told next. */
+  /** A refusal stays beside its field, whatever is reported next. */
   const tellBeside = () => {
     const beside = [...wrongs.values()].some(({ text }) => text === store.state.problem);
     if (beside && store.tab === "settings") hide({ problem: true });
@@ -103,14 +103,14 @@ function showProfiles(profiles) {
   putRows(rows, $("profiles-list"));
 }
 
-/** A word finds its plural, too, and the other way round. */
-const stem = (word) => (/^[a-z]{3,}s$/.test(word) ? word.slice(0, -1) : word); // a key stays whole
+/** A word also finds its plural, and a plural its singular. */
+const stem = (word) => (/^[a-z]{3,}s$/.test(word) ? word.slice(0, -1) : word); // keys are not stemmed
 
-/** The words by which a setting is found, those that say most first. */
+/** The words by which a setting is found, the most significant first. */
 const textsOf = ({ key, label, title, synonyms, meaning, about }) => [`${label} ${key}`, synonyms, `${title} ${meaning} ${about}`].map((text) => text.toLowerCase());
 const hasWords = (setting, words) => words.every((word) => textsOf(setting).join(" ").includes(word));
 
-/** How late the words that are sought come: 0, where the label is these alone, 1, where it or the key has one. */
+/** Rank of a match: 0 where the label is exactly these words, 1 where it or the key contains one, higher for the other texts. */
 function farFrom(setting, words) {
   if (!words.length || setting.label.toLowerCase().split(/\s+/).map(stem).join(" ") === words.join(" ")) return 0;
   return 1 + textsOf(setting).findIndex((text) => words.some((word) => text.includes(word)));
@@ -123,7 +123,7 @@ function groupedBy(rows, nameOf) {
   return groups;
 }
 
-/** Whose changes there are, with a button for each profile that has some, and one for all. */
+/** The profiles that have changes, with a reset button for each, and one for all. */
 function tellTakeBack(changed, part) {
   const counts = groupedBy(changed, ({ key }) => KIND_OF[key.split(".")[0]]);
   for (const kind of KINDS) {
@@ -141,7 +141,7 @@ function groupTitle(own, folded, turn) {
   return { id: `group ${group}`, content, make: () => made("h2", {}, button("", turn, more, ...words())) };
 }
 
-/** A text into the clipboard, or marked for the person to take where the browser allows no more. */
+/** Copy a text to the clipboard, or select it for the user to copy where the browser does not allow that. */
 async function copyText(element, button) {
   getSelection().selectAllChildren(element);
   const copied = await navigator.clipboard?.writeText(element.textContent).then(() => true, () => false);
@@ -189,11 +189,11 @@ function inputOf({ kind, choices, least, most }, value) {
   return made("input", { type: "number", step: kind === "integer" ? 1 : "any", value: typed, ...limits });
 }
 
-/** What a person has typed or chosen, as --set takes it; null, for nothing where there must be something: as the profile has it. */
+/** The value that the user has typed or chosen, as --set takes it; null for an empty field that needs a value: the profile's. */
 function typedIn(input, { kind, optional, unit }) {
   if (kind === "boolean") return `${input.checked}`;
   const text = kind === "block" ? input.value : input.value.trim();
-  if (kind === "block" || kind === "text") return JSON.stringify(text).replace(/\x7f/g, "\\u007f"); // which TOML reads, too
+  if (kind === "block" || kind === "text") return JSON.stringify(text).replace(/\x7f/g, "\\u007f"); // TOML reads this, too
   if (!text) return optional ? "" : null;
   return kind === "numbers" ? `[${text}]` : unit === "%" ? `${text}%` : text;
 }

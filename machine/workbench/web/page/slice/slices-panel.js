@@ -11,7 +11,7 @@ export function slicesPanel(showFinding) {
     again: () => $("slice").click(), look: () => update({ looking: store.looking !== true }),
     "leave-print": () => {
       update({ looking: false });
-      for (const id of [`tab-${store.tab}`, "look"]) $(id).focus(); // what is hidden takes no focus
+      for (const id of [`tab-${store.tab}`, "look"]) $(id).focus(); // hidden elements take no focus
     },
   });
   onState(({ slicing, sliced, colours, unsliceable }) => {
@@ -33,7 +33,7 @@ export function slicesPanel(showFinding) {
   });
 }
 
-/** Whether it can be printed, in one sentence, with a button for what a button can do. */
+/** Whether the model can be printed, in one sentence, with a button for each action that a button can do. */
 function showVerdict({ kind, text, finding, remedy }, showFinding) {
   $("verdict").className = `sliced ${kind}`;
   tell({ "verdict-told": `${text}.` });
@@ -43,7 +43,7 @@ function showVerdict({ kind, text, finding, remedy }, showFinding) {
   $("verdict-show").onclick = () => showFinding(finding);
 }
 
-/** Of every part how much is sliced; the whole as one bar where there is one part. */
+/** Slicing progress of every part; one bar for the whole where there is only one part. */
 function showShares(slicing, colours) {
   const shares = slicing ? slicing.shares : [], ready = shares.filter((share) => share === 1).length;
   if (shares.length) $("slicing-bar").value = shares.reduce((sum, share) => sum + share, 0) / shares.length;
@@ -58,7 +58,7 @@ function showShares(slicing, colours) {
 
 const JOINT_HEAD = ["joint of part", "area", "contact", "plastic", "seam", "breaks at"];
 
-/** A row of figures after their title. */
+/** A row of figures after its title. */
 const figuresRow = ([title, ...texts]) => made("tr", {}, made("th", { text: title, scope: "row" }), ...texts.map((text) => made("td", { text })));
 
 function showFindings(sliced, showFinding) {
@@ -69,7 +69,7 @@ function showFindings(sliced, showFinding) {
 }
 
 export function stopsPanel() {
-  let adding = false; // what was typed stays until it is taken
+  let adding = false; // typed text stays until it is accepted
   listen("change", { copies: () => send({ do: "copies", count: numberIn("copies") }) });
   listen("submit", { "add-stop": (event) => {
     event.preventDefault();
@@ -86,7 +86,7 @@ export function stopsPanel() {
     const held = $("stops").contains(document.activeElement);
     putTable($("stops"), stops, [], () => stops.map(({ kind, where }, k) => (
       rowOf([kind, where, removeButton(`Remove the ${kind} of ${where}`, () => send({ do: "remove_stop", number: k + 1 }))]))));
-    if (held) $("stop-at").focus(); // the row that had the focus is gone
+    if (held) $("stop-at").focus(); // the row that had the focus was removed
   });
 }
 
@@ -102,8 +102,8 @@ export function comparePanel() {
   });
 }
 
-const PIECE = 7; // numbers of a straight piece: two ends and its height
-const BROAD = 1.1; // half the width of a bead, by its height
+const PIECE = 7; // numbers for each straight piece: two ends and its height
+const BROAD = 1.1; // half the width of a bead, as a multiple of its height
 
 /** Triangles {places, colours} of a part's walls, from the server's bytes: an upright band along each piece, and a level one as wide as a bead, so that slopes have no gaps. */
 function bandsOf(bytes, colour) {
@@ -119,14 +119,14 @@ function bandsOf(bytes, colour) {
   return { places, colours: new Uint8Array(colours.buffer) };
 }
 
-/** What is seen of the parts that are sliced, as they become ready or while they are not out of date, over the faint model and its copies. */
+/** Walls of the sliced parts, as they become ready or while they are current, over the faint model and its copies. */
 export function wallsOf(picture) {
-  let number = 0, asked = new Set(); // of the slices whose walls are there, or asked for
+  let number = 0, asked = new Set(); // slices whose walls are loaded or requested
   const fetchPart = async (part, of) => {
     asked.add(part);
     const answer = await fetch(`walls/${of}/${part}`).catch(() => null);
     if (number !== of) return;
-    if (!answer) asked.delete(part); // the line is lost: the next state asks again
+    if (!answer) asked.delete(part); // the connection is lost: the next state requests it again
     if (answer?.ok) update({ walls: new Map(store.walls).set(part, bandsOf(await answer.arrayBuffer(), store.state.colours[part - 1] || PLAIN)) });
   };
   subscribe(({ state: { slicing, sliced }, tab, triangles }) => {
@@ -142,7 +142,7 @@ export function wallsOf(picture) {
   });
 }
 
-/** What is not there yet says why. */
+/** The Save menu; entries that are not available yet state the reason. */
 export function saveMenu() {
   const confirm = () => {
     const { errors } = store.state.sliced;
