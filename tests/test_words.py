@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("mdp", "slicer", "profiles", "machine", "tools")
+PACKAGES = ("mdp", "slicer", "profiles", "machine", "tools", "tests")
 # Words and constructions to avoid -> what to write instead. Matched in each paragraph, ignoring case except in (?-i:).
 WORDS = {
     r"\btold\b|\btells?\b(?!: )": "given, reported, distinguishes",
