@@ -236,9 +236,7 @@ def test_from_the_phone_a_model_is_turned_and_a_print_stopped(bench: OpenToNetwo
     with devices_page(bench) as own:
         own.do("unpair", device=own.state["devices"][-1]["number"])
         browser.wait("document.documentElement.dataset.line === 'unpaired'")
-    assert browser.value("$('notice').checkVisibility() && $('notice').textContent").startswith(
-        "This device is no longer paired"
-    )
+    assert browser.value("$('notice').checkVisibility() && $('notice').textContent").startswith("This device is no longer paired")
     browser.value("location.reload()")
     browser.wait("document.getElementById('code')")
 

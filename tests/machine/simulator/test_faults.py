@@ -184,7 +184,7 @@ def test_a_script_is_read_from_a_file(tmp_path: Path) -> None:
 
 
 def test_the_page_s_example_is_a_script_and_the_docstring_has_all_kinds(tmp_path: Path) -> None:
-    page = (Path(__file__).parents[3] / "docs" / "serial.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "CONTRIBUTING.md").read_text(encoding="utf-8")
     (example,) = (text for text in re.findall(r"```toml\n(.*?)```", page, re.DOTALL) if "[[fault]]" in text)
     (tmp_path / "faults.toml").write_text(example)
     assert [fault.kind for fault in read_script(tmp_path / "faults.toml").faults] == ["flip", "disconnect"]

@@ -137,7 +137,7 @@ def test_a_page_of_a_killed_workbench_says_what_to_do_and_the_next_one_offers_it
     with workbench("--port", port) as running:
         browser.wait("document.documentElement.dataset.line === 'replaced'")
         problem = browser.value("$('notice').checkVisibility() && $('notice').textContent")
-        assert problem.endswith("Another one is here now: open the address that its terminal has told.")
+        assert problem.endswith("Another one runs now: open the address in its terminal.")
         browser.open(running.address)
         browser.wait("!$('left-field').hidden")
         assert browser.value("$('left-list').querySelector('button span').textContent") == "tee.stl"
