@@ -30,6 +30,8 @@ def firefox(bench: Running) -> Iterator[Firefox]:
 
 
 def middle(firefox: Firefox, element: str) -> tuple[float, float]:
+    """The middle of an element, read after the next frame: handles move with the picture."""
+    firefox.value("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
     x, y = firefox.value(
         f"(() => {{ const b = $('{element}').getBoundingClientRect(); return [b.x + b.width / 2, b.y + b.height / 2]; }})()"
     )
