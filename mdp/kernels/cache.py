@@ -38,7 +38,7 @@ from numba.core.runtime import _nrt_python
 from profiles.folders import cache_folder, lost_at_end
 
 PACKAGES = Path(__file__).resolve().parents[2]
-SHIPPED = Path(__file__).resolve().parent / "compiled"  # made by tools/ship_kernels.py; not there in a checkout
+SHIPPED = Path(__file__).resolve().parent / "compiled"  # made by .ci/ship_kernels.py; not there in a checkout
 IMPORTED = re.compile(rb"^from ((?:profiles|mdp|slicer|machine)(?:\.\w+)+) import", re.MULTILINE)
 HAS_KERNELS = b"from mdp.kernels.kernel import"
 UNREADABLE = (OSError, EOFError, ValueError, UnpicklingError)  # raised for a file that is unreadable or cut short

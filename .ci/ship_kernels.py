@@ -1,7 +1,7 @@
 """Ship kernels: put compiled kernels beside the packages, so that a first run need not compile for a minute.
 
-    python tools/ship_kernels.py -o dist      a wheel of this checkout with kernels
-    PYTHON tools/ship_kernels.py              adds kernels to the packages that this PYTHON imports
+    python .ci/ship_kernels.py -o dist      a wheel of this checkout with kernels
+    PYTHON .ci/ship_kernels.py              adds kernels to the packages that this PYTHON imports
 
 They fit the Python, numba and llvmlite that run this script, on processors of the same kind (mdp.kernels.cache); with others the
 program compiles as without them. Kernels in the folder NUMBA_CACHE_DIR are not compiled again.

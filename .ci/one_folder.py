@@ -1,6 +1,6 @@
 """One folder: tiltprint with its own Python and all libraries, for a Linux without Python.
 
-    python tools/one_folder.py -o dist/tiltprint-linux [--wheel FILE.whl]
+    python .ci/one_folder.py -o dist/tiltprint-linux [--wheel FILE.whl]
 
 Copies the Python that runs this script, without unneeded parts, installs the wheel (built first by default) and its libraries
 into it, adds the system libraries to which its modules are linked, and compiles the kernels. `tiltprint` in the folder starts the
@@ -52,7 +52,7 @@ def main() -> None:
     subprocess.run(pip, check=True)
     shutil.rmtree(packages / "bin", ignore_errors=True)
     _copy_libraries(given.out)
-    subprocess.run([given.out / "bin" / VERSION, "-I", ROOT / "tools" / "ship_kernels.py"], check=True)
+    subprocess.run([given.out / "bin" / VERSION, "-I", ROOT / ".ci" / "ship_kernels.py"], check=True)
     _write_licences(given.out, packages)
     launcher = given.out / "tiltprint"
     launcher.write_text(LAUNCHER)
