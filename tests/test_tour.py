@@ -13,7 +13,7 @@ from tools.docs.draw_rooms import modules
 
 ROOT = Path(__file__).resolve().parents[1]
 TOUR = "docs/tour.md"
-PAGES = sorted(str(page.relative_to(ROOT)) for page in (*ROOT.glob("docs/*.md"), *ROOT.glob("*.md")))
+PAGES = sorted(str(page.relative_to(ROOT)) for page in (*ROOT.glob("docs/*.md"), *ROOT.glob("tools/**/*.md"), *ROOT.glob("*.md")))
 NAME = re.compile(r"`((?:profiles|mdp|slicer|machine)(?:\.[A-Za-z_]\w*)+)([(][^`]*)?`")
 
 

@@ -28,7 +28,7 @@ def bench(given: argparse.Namespace) -> None:
             file, ours, theirs = folder / "model.stl", folder / "ours.gcode", folder / "theirs.gcode"
             file.write_bytes(stl(mesh))
             same = [*harness.SAME, *([harness.OUR_SUPPORT] if given.support else [])] if given.do == "export" else []
-            further = {"export": ["--parts", "1", "--as-is", "-o", ours], "print": ["--port", "sim"]}.get(given.do, [])
+            further = {"export": ["--parts", "1", "--as-is", "--force", "-o", ours], "print": ["--port", "sim"]}.get(given.do, [])
             commands = [[*OURS, given.do, file, *further, *(f"--set={setting}" for setting in (*same, *given.set))]]
             if given.do == "export" and (prusa := harness.prusa_command(file, theirs, given.support)) is not None:
                 commands.append(prusa)
