@@ -104,7 +104,7 @@ class Table(Frozen):
     )
     thickness_mm: float = rare("Thickness", "build plate", gt=0, le=200)(..., "thickness of the plate, mm")
     clips: list[TableBox] = rare("Clips", "bed clips binder clip screws magnets disallowed areas excluded area")(
-        [], "what stands on the plate and turns with it: clips, screws; models are placed clear of them"
+        [], "bodies fixed on the plate that turn with it: clips, screws; models are placed clear of them"
     )
 
     @model_validator(mode="before")

@@ -147,7 +147,7 @@ class Plate(Frozen):
         0.1, "gap between raft and model, mm; 0: it welds"
     )
     raft_expansion_mm: float = advanced("Raft expansion", "raft margin extra", ge=0, le=50)(
-        1.5, "width of the raft beyond what stands on it, mm"
+        1.5, "width of the raft beyond model and support, mm"
     )
     raft_first_layer_density: float = advanced("Density of the raft's first layer", "raft base line spacing", ge=0.1, le=1)(
         0.9, "filled share of a raft's first layer: less is easier to take off the plate"

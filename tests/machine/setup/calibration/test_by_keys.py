@@ -1,30 +1,25 @@
 """Touches by keys: the user moves the tip of a machine at a port onto a mark in steps."""
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from machine.cli.cli import main
-from machine.cli.commands.measuring import calibrate_by_keys
-from machine.cli.commands.measuring.calibrate_by_keys import ENTER, KeyedTouches
+from machine.cli.commands.measuring.calibrate_by_keys import KeyedTouches
 from machine.kinematics.table import machine_points
-from machine.printing.command_session import CommandSession
 from machine.setup.calibration.fit import Touch
-from machine.setup.calibration.program import STEPS_MM, WAYS, Jog, begin_jog, plan_touches, pressed
+from machine.setup.calibration.program import STEPS_MM, Jog, begin_jog, plan_touches, pressed
 from machine.simulator.simulator import SimulatedPrinter
 from mdp.pose import Pose, level
 from profiles.errors import MoveError
-from profiles.machine import Machine
 from profiles.places import own_folder
 from profiles.profile import load
+from tests.machine.setup.calibration.steady_hand import Mover, put_hand_on, steady_hand
 from tests.machine.setup.calibration.touches import machine_of, really
 
 GENERIC = machine_of("generic_ac")
 MARK = (38.0, 2.0, 20.0)
-MOST_KEYS = 3000
 
 
 @pytest.fixture(autouse=True)
@@ -33,43 +28,10 @@ def _folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
 
 
-class Mover:
-    """Goes wherever it is sent, and records its moves."""
-
-    def __init__(self) -> None:
-        self.at_mm, self.pose, self.turned_at_mm = [0.0, 0.0, 150.0], Pose(0.0, 0.0), list[float]()
-
-    def rise(self, z_mm: float) -> None:
-        self.at_mm[2] = z_mm
-
-    def cross(self, x_mm: float, y_mm: float) -> None:
-        self.at_mm[:2] = x_mm, y_mm
-
-    def turn(self, pose: Pose) -> None:
-        self.pose = pose
-        self.turned_at_mm.append(self.at_mm[2])
-
-    def arrive(self) -> None:
-        """Every move has already ended."""
-
-
-def steady_hand(mover: Mover, real: Machine) -> Iterator[str]:
-    """Keys that move the tip onto the mark of a real machine, as near as the smallest step allows, again and again."""
-    for _ in range(MOST_KEYS):
-        away = machine_points(real, mover.pose, np.array([MARK]))[0] - np.array(mover.at_mm)
-        axis = int(np.abs(away).argmax())
-        if abs(away[axis]) <= 0.5 * STEPS_MM["4"]:
-            yield "\n"
-            continue
-        yield next((key for key, step in STEPS_MM.items() if step <= abs(away[axis])), "4")
-        yield next(key for key, way in WAYS.items() if way == (axis, int(np.sign(away[axis]))))
-    raise AssertionError(f"{away} mm from the mark at {mover.pose}, and no step leads nearer")
-
-
 def test_a_steady_hand_takes_twelve_touches_to_a_hundredth() -> None:
     real, mover = really(GENERIC, {"point_mm": (0.0, 0.8, -13.0)}, {"point_mm": (0.5, -0.4, 0.0)}), Mover()
     plan = plan_touches(GENERIC, MARK[2], float(np.hypot(*MARK[:2])))
-    touches = KeyedTouches(GENERIC, plan, mover, steady_hand(mover, real), lambda line: None).run()  # type: ignore[arg-type]
+    touches = KeyedTouches(GENERIC, plan, mover, steady_hand(mover, real, MARK), lambda line: None).run()  # type: ignore[arg-type]
     exact = [machine_points(real, touch.pose, np.array([MARK]))[0] for touch in touches]
     assert len(touches) == 12
     assert np.abs([touch.at_mm for touch in touches] - np.array(exact)).max() <= 0.5 * STEPS_MM["4"] + 1e-9
@@ -128,31 +90,8 @@ def test_where_a_sign_is_unknown_the_mark_may_be_as_deep_as_it_is_either_way() -
 def test_the_command_saves_what_a_hand_has_touched_and_leaves_the_machine_level_and_cold(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    real, mover = really(GENERIC, {"point_mm": (0.0, 0.8, -13.0)}, {"point_mm": (0.5, -0.4, 0.0)}), Mover()
-
-    class Followed(calibrate_by_keys.PrinterMover):
-        """A mover at a real port that also reports its position to the simulated hand."""
-
-        def rise(self, z_mm: float) -> None:
-            super().rise(z_mm)
-            mover.rise(z_mm)
-
-        def cross(self, x_mm: float, y_mm: float) -> None:
-            super().cross(x_mm, y_mm)
-            mover.cross(x_mm, y_mm)
-
-        def turn(self, pose: Pose) -> None:
-            super().turn(pose)
-            mover.turn(pose)
-
-    @contextmanager
-    def keys(session: CommandSession) -> Iterator[Iterator[str]]:
-        hand = steady_hand(mover, real)
-        yield iter(lambda: ENTER[0] if mover.turned_at_mm == [] else next(hand), None)  # type: ignore[arg-type]
-
-    monkeypatch.setattr(calibrate_by_keys, "PrinterMover", Followed)
-    monkeypatch.setattr(calibrate_by_keys, "keys_of_a_person", keys)
-    monkeypatch.setattr(calibrate_by_keys, "can_type", lambda: True)
+    real = really(GENERIC, {"point_mm": (0.0, 0.8, -13.0)}, {"point_mm": (0.5, -0.4, 0.0)})
+    put_hand_on(monkeypatch, real, MARK)
     with SimulatedPrinter(GENERIC, float("inf")) as printer:
         radius = str(float(np.hypot(*MARK[:2])))
         command = ["calibrate", "--port", printer.path, "--mark-height", "20", "--mark-radius", radius]
