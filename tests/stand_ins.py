@@ -3,6 +3,7 @@
 import re
 import subprocess
 from contextlib import ExitStack
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +11,13 @@ import manifold3d as m3
 import numpy as np
 import pytest
 
+from machine.cli.cli import main
 from machine.printing import ports
 from machine.printing.servers import follow
 from machine.printing.servers.http import VARIABLE
 from machine.setup.calibration.program import plan_touches
 from machine.simulator.contact import ProbedTable, TrueBall
+from machine.simulator.faults import Fault
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.places import shipped
 from profiles.profile import load
@@ -28,6 +31,14 @@ from tests.mdp.slicer_files import Made, Object, Placed, bambu
 PORT = "/dev/ttyACM0"
 SERVER = re.compile(r"(octoprint|moonraker|duet):[\w.]+")
 NEWTONS = 80.0
+POWER_CUT_LINE = 1000
+
+
+class Terminal(StringIO):
+    """A terminal at which a user types these lines."""
+
+    def isatty(self) -> bool:
+        return True
 
 
 class DuetWithUAndV(TellingDuet):
@@ -67,7 +78,11 @@ def at_stand_ins(line: str, monkeypatch: pytest.MonkeyPatch, until_end: ExitStac
         machine = load(named[1] if named and named[1] in shipped("machine") else "generic_ac").machine
         radius_mm = min(0.6 * machine.table.radius_mm, 45.0)
         table = ProbedTable(machine, TrueBall(10.0, (radius_mm, 0.0, 45.0)), noise_mm=0.005, flat_mm=0.5)
-        path = until_end.enter_context(SimulatedPrinter(machine, table=table)).path
+        cut = [Fault("reset", at=POWER_CUT_LINE, unit="line")] if "JOURNAL" in line else []
+        path = until_end.enter_context(SimulatedPrinter(machine, table=table, faults=cut)).path
+        if cut:
+            assert main(["export", "model.stl", "-o", "model.gcode"]) == 0
+            assert main(["print", "model.gcode", "--port", path, "--journal", "JOURNAL"]) == 1
         monkeypatch.setattr(ports, "serial_devices", lambda: (ports.SerialDevice(path, path, "", ""),))
         line = line.replace(PORT, path)
     if (mark := re.search(r"--machine (\S+) --mark-height (\d+) --port", line)) is not None:

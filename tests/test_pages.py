@@ -26,8 +26,8 @@ ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 # Commands that install something or need a scheduler: neither run nor checked, with the README's own test command.
 NEITHER = ("python3 -m venv ", "pip install ", "dask ")
-# Checked for valid options only: they need the user's own interrupted print or a scheduler, or run for an hour or more.
-ONLY_PARSED = ("tiltprint resume JOURNAL", "tiltprint batch /farm", "python -m mdp.learning.", "python tools/campaigns/")
+# Checked for valid options only: they need a scheduler, or run for an hour or more.
+ONLY_PARSED = ("tiltprint batch /farm", "python -m mdp.learning.", "python tools/campaigns/")
 ONLY_PARSED += ("python tools/bench/benchmark.py",)
 UNTIL_CTRL_C = ("edit", "simulator")  # run in a process of their own
 PATIENCE_S = 60.0
@@ -153,7 +153,8 @@ def run(line: str, monkeypatch: pytest.MonkeyPatch) -> int:
     if not line.startswith("tiltprint "):
         run_script(words, monkeypatch)
         return 0
-    monkeypatch.setattr(sys, "stdin", io.StringIO("M115\n" if words[0] == "console" else ""))
+    typed = {"console": io.StringIO("M115\n"), "resume": stand_ins.Terminal("y\n")}
+    monkeypatch.setattr(sys, "stdin", typed.get(words[0], io.StringIO()))
     return main(words)
 
 
