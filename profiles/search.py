@@ -33,48 +33,48 @@ class Search(Frozen):
         "best", "published: the authors' stop rule and bookkeeping, for comparisons; best: ours"
     )
     beam_width: int = advanced("Beam width", "thoroughness search effort", ge=1, le=1000)(4, "decompositions followed at a time")
-    objective: Literal["scar", "risky"] = rare("What is made small")(
+    objective: Literal["scar", "risky"] = rare("Objective")(
         "scar",
         "scar minimises support, seams, cuts, stair-stepping and bores, risky the area that needs support alone, as published",
     )
-    seam_mm: float = advanced("Width of a cut's scar", "seam weight", ge=0, le=100)(
+    seam_mm: float = advanced("Width of a seam's blemish", "seam weight", ge=0, le=100)(
         5.0,
         "width of a cut seam's blemish on a model of 100 mm, mm; in proportion on others: a cut must make more surface safe "
         "than its rim takes; 0: the paper's objective",
     )
-    feather_weight: float = rare("Thin edges count", "feather sharp", ge=0, le=100)(
+    feather_weight: float = rare("Weight of thin edges", "feather sharp", ge=0, le=100)(
         0.5,
         "extra weight of a seam at edges below 30 deg; it is multiplied by cot angle - cot 30: such edges are thin, warp and "
         "break",
     )
-    cut_mm2: float = advanced("What a cut costs", "fewer parts penalty", ge=0, le=10000)(
+    cut_mm2: float = advanced("Cost of a cut", "fewer parts penalty", ge=0, le=10000)(
         10.0,
         "cost of a cut besides its seam: one more turn, one more joint that can fail, mm²; a cut that saves less than its "
         "seam and this is not made",
     )
-    stair_weight: float = advanced("Stairs count", "staircase layer lines stepping quality", ge=0, le=10)(
+    stair_weight: float = advanced("Weight of stair-stepping", "staircase layer lines stepping quality", ge=0, le=10)(
         0.1,
         "weight of stair-stepping as high as a 0.2 mm layer (support: 1); less where the layers or the angle make the steps "
         "lower: walls and level faces have none, so parts are printed along their faces; 0: stair-stepping does not count",
     )
-    second_mm2: float = advanced("What a second costs", "print time penalty", ge=0, le=1000)(
+    second_mm2: float = advanced("Cost of a second", "print time penalty", ge=0, le=1000)(
         0.1,
         "cost of a second of printing in the final choice: so much surface that a seam or support blemishes, mm² (1 cm² is "
         "worth 1000 s); 0: time is free, as it is without support",
     )
-    metre_mm2: float = advanced("What a metre of filament costs", "plastic waste penalty", ge=0, le=1e5)(
+    metre_mm2: float = advanced("Cost of a metre of filament", "plastic waste penalty", ge=0, le=1e5)(
         100.0,
         "cost of a metre of filament in the final choice, mm² (as 1000 s do: support has to be removed again); 0: it is free, "
         "as it is without support",
     )
-    hidden_seam_share: float = rare("Hidden cuts count", gt=0, le=1)(
+    hidden_seam_share: float = rare("Weight of hidden seams", gt=0, le=1)(
         0.25,
         "weight of a seam in a crease, in a neck or out of sight; 1: as in plain sight; 100 %: the same everywhere",
     )
-    feature_weight: float = rare("Cuts across bores count", "holes", ge=1, le=1000)(
+    feature_weight: float = rare("Weight of seams across bores", "holes", ge=1, le=1000)(
         4.0, "weight of a seam across a bore; 1: as elsewhere"
     )
-    feature_mm2: float = rare("What a cut askew through a bore costs", "holes", ge=0, le=1e5)(
+    feature_mm2: float = rare("Cost of an oblique cut through a bore", "holes", ge=0, le=1e5)(
         500.0,
         "cost of a cut askew through a bore, besides its seam, mm²; one across its axis leaves it round and costs nothing",
     )
@@ -141,7 +141,7 @@ class Search(Frozen):
         "a cut may take single limbs; others stay beside the part where the head passes them clear; false: it takes all that "
         "lies above its plane",
     )
-    clearance: bool = rare("Heed the head and the axes", "collision")(
+    clearance: bool = rare("Respect head and axis limits", "collision")(
         True, "false: the head's bodies and the axis limits are ignored (the authors' terms)"
     )
 

@@ -27,7 +27,7 @@ TURNS = 18  # directions tried over half a turn, besides those of the area's sid
 SIDES = 8  # number of longest sides that are tried, along and across: lines follow a real side, not the mean of several
 LEAST = 4.0  # in line widths squared: a smaller area is not a bridge but an edge
 LOOSE = 2.63  # a line held at one end sags like one this much longer held at both: (384 / 8)^(1/4), beam theory
-ADRIFT = 10.0  # equivalent factor for a line held at no end
+UNHELD = 10.0  # equivalent factor for a line held at no end
 LINE_RIM_MM = 0.02  # overlap by which neighbouring lines unite
 GAIN = 0.1  # least relative reduction of the sag over directions tried before; the area's sides come first
 
@@ -167,7 +167,7 @@ def _least_sag(sides: Floats, anchors: EdgeIndex, angles: Floats, width_mm: floa
         for k in range(len(lines)):
             held, span = lines[k, 3], lines[k, 1] - lines[k, 0]
             total, longest, any_held = total + span, max(longest, span), any_held or held > 0.0
-            sagging += (1.0 if held == 2.0 else LOOSE**4 if held == 1.0 else ADRIFT**4) * span**4
+            sagging += (1.0 if held == 2.0 else LOOSE**4 if held == 1.0 else UNHELD**4) * span**4
             free += span if held < 2.0 else 0.0
         if total - free > most_mm:
             holding, most_mm = angle, total - free

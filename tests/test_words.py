@@ -1,16 +1,18 @@
-"""Docstrings and comments use the words of CONTRIBUTING.md's glossary, and not those in WORDS."""
+"""Docstrings, comments and messages use the words of CONTRIBUTING.md's glossary, and not those in WORDS."""
 
 import ast
 import io
 import re
 import tokenize
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
-PACKAGES = ("mdp", "slicer", "profiles", "machine", "tools", "tests")
+PROGRAM = ("mdp", "slicer", "profiles", "machine")
+PACKAGES = (*PROGRAM, "tools", "tests")
+SETTINGS = ("simple", "advanced", "rare")  # their second argument: words of other programs, by which a setting is found
 # Words and constructions to avoid -> what to write instead. Matched in each paragraph, ignoring case except in (?-i:).
 WORDS = {
     r"\btold\b|\btells?\b(?!: )": "given, reported, distinguishes",
@@ -37,7 +39,7 @@ WORDS = {
     r"\b(some|no)body\b|\bwhoever\b": "the user, another process, no one",
     r"(?-i:\b[Pp]latforms?\b)": "build plate",
     r"\bstairs\b": "stair-stepping",
-    r"\bscar(s|red)?\b": "blemish",
+    r"\bscar(s|red)?\b(?! minimises)": "blemish",
     r"\bcrumbs?\b": "fragment",
     r"\bhairs?\b": "sliver",
     r"\bshut\b(?! down)": "blocked, closed",
@@ -77,11 +79,23 @@ def words_of(source: str) -> Iterator[tuple[int, str]]:
             yield token.start[0], token.string.lstrip("# ")
 
 
-def findings(source: str) -> list[str]:
-    """A line for every banned word of a file, with what to write instead."""
+def messages_of(source: str) -> Iterator[tuple[int, str]]:
+    """The texts of a file that the program may print: strings with a space, on one line, with the number of their line."""
+    tree = ast.parse(source)
+    quiet = {id(node.value) for node in ast.walk(tree) if isinstance(node, ast.Expr)}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) and node.func.id in SETTINGS:
+            quiet |= {id(synonyms) for synonyms in node.args[1:]}
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and " " in node.value.strip() and id(node) not in quiet:
+            yield node.lineno, " ".join(node.value.split())
+
+
+def findings(source: str, texts: Callable[[str], Iterator[tuple[int, str]]] = words_of) -> list[str]:
+    """A line for every banned word in texts of a file, with what to write instead."""
     return [
         f"{number}: {match[0]!r}: write {instead}"
-        for number, text in words_of(source)
+        for number, text in texts(source)
         for pattern, instead in WORDS.items()
         for match in re.finditer(pattern, CODE.sub("``", text), re.IGNORECASE)
     ]
@@ -93,6 +107,25 @@ def test_docstrings_and_comments_use_the_words_of_the_glossary(package: str) -> 
     assert files
     found = [f"{file.relative_to(ROOT)}:{line}" for file in files for line in findings(file.read_text(encoding="utf-8"))]
     assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize("package", PROGRAM)
+def test_messages_use_the_words_of_the_glossary(package: str) -> None:
+    files = sorted((ROOT / package).rglob("*.py"))
+    found = [f"{file}:{line}" for file in files for line in findings(file.read_text(encoding="utf-8"), messages_of)]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("source", "count"),
+    [
+        ('"""It was told."""\nraise UserError(f"{name} is no file any more")', 2),
+        ('x = advanced("Seam", "scar of a cut")(1.0, "width of the scar")', 1),
+        ('TOLD = "told"', 0),
+    ],
+)
+def test_the_check_finds_words_in_messages_only(source: str, count: int) -> None:
+    assert len(findings(source, messages_of)) == count
 
 
 @pytest.mark.parametrize(

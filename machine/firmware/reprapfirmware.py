@@ -21,7 +21,7 @@ COMMANDS = {
     "M98": Command("run a macro", heats="any"),
     "M144": Command("bed to its standby temperature, or its active one", heats="any"),
     "M290": Command("baby step"),
-    "M291": Command("ask a person", waits="person", answer_s=PERSON_S),
+    "M291": Command("ask the user", waits="person", answer_s=PERSON_S),
     "M292": Command("answer a question"),
     "M409": Command("report the object model"),
     "M552": Command("network"),

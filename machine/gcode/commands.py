@@ -21,7 +21,7 @@ from profiles.errors import GcodeError
 NEXT_COMMAND = re.compile(r"(?=[GM] *[0-9])")
 TOOL, HOME = "T", "HOME_"  # rows of T0, T1, ... and of macros such as HOME_AB
 TOOLS, HOMES = re.compile(r"T-?\d+"), re.compile(r"HOME_[A-DU-Z]+")
-AT_BUTTONS, SENDERS = "waits for a person at the printer's own buttons", "is an order of the sender"
+AT_BUTTONS, SENDERS = "waits for the printer's own buttons", "is an order of the sender"
 
 # fmt: off
 COMMANDS: dict[str, Command] = {
@@ -122,9 +122,9 @@ COMMANDS: dict[str, Command] = {
     "M413": Command("power-loss recovery", tunes=True),
     "M420": Command("use the mesh of the bed"),
     # waiting for the user
-    "M0": Command("wait for a person", waits="person", refused=AT_BUTTONS),
-    "M1": Command("wait for a person", waits="person", refused=AT_BUTTONS),
-    "M125": Command("park and wait for a person", waits="person", answer_s=PERSON_S),
+    "M0": Command("wait for the user", waits="person", refused=AT_BUTTONS),
+    "M1": Command("wait for the user", waits="person", refused=AT_BUTTONS),
+    "M125": Command("park and wait for the user", waits="person", answer_s=PERSON_S),
     "M226": Command("pause (RepRapFirmware), wait for a pin (Marlin)", waits="person", answer_s=PERSON_S),
     "M600": Command("change the filament, the nozzle hot", moves="other", heats="any", waits="person", answer_s=PERSON_S),
     "M701": Command("load filament, the nozzle hot", moves="other", heats="any", answer_s=PERSON_S),

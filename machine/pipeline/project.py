@@ -364,7 +364,7 @@ def _toml(file: Path) -> dict[str, Any]:
     try:
         return read_toml(file.read_text(encoding="utf-8"))
     except ValueError as error:
-        raise PlanError(f"its file {file.name} is no TOML: {error}") from None
+        raise PlanError(f"its file {file.name} is not TOML: {error}") from None
 
 
 def figures_of(row: FrontRow | None) -> dict[str, float]:

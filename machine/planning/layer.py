@@ -124,7 +124,7 @@ def _over_standing(tip: Tip, approach: Floats, start: Floats, shift: Floats, ove
     z_mm += machine.clearance_mm
     if z_mm > machine.z.limits_mm[1]:
         raise MoveError(
-            f"part {part}: a way within it needs the tip at Z {z_mm:.1f} mm for the head to pass what stands beside it, "
+            f"part {part}: a travel within it needs the tip at Z {z_mm:.1f} mm for the head to pass the bodies beside it, "
             f"{machine.name} allows at most {machine.z.limits_mm[1]:g} mm"
         )
     return z_mm

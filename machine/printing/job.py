@@ -103,5 +103,5 @@ class Person(Protocol):
     def left(self) -> bool:
         """Whether the user has left a print that continues without this program."""
 
-    def gives_up(self) -> bool:
+    def cancels(self) -> bool:
         """Whether the user has cancelled a print on a server before its start."""

@@ -84,7 +84,7 @@ class ServerPrinter:
         try:
             file = hand_over(server, upload, loaded.name, self._scene(), person)
             check_free(server.name, server.status())  # another client may have started a print in the meantime
-            if person.gives_up():
+            if person.cancels():
                 return NOT_BEGUN
         except CancelledError:
             return NOT_BEGUN
@@ -153,7 +153,7 @@ def hand_over(server: PrintServer, upload: GcodeUpload, named: str, scene: Scene
 
         def sent(count: int) -> None:
             nonlocal gone
-            if person.gives_up():
+            if person.cancels():
                 raise CancelledError
             gone = count
             state = f"{_megabytes(count)} of {_megabytes(total)}" if count < total else "the server reads it"

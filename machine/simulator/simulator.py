@@ -146,7 +146,7 @@ class Terminal:
 
     def __init__(self, link: Path | None = None) -> None:
         if link is not None and (link.exists() or link.is_symlink()) and not _leads_to_a_terminal(link):
-            raise PortError(f"{link} exists and is no link to a terminal: the simulated printer does not replace it")
+            raise PortError(f"{link} exists and is not a link to a terminal: the simulated printer does not replace it")
         self._link = link
         self._master = self._slave = -1
         self._device = self.path = ""

@@ -33,7 +33,17 @@ MOVES = {
 }  # fmt: skip
 UNKNOWN = "unknown"
 COMPARED = "Compared"
-COSTS = ("time", "filament m", "plastic g", "support cm³", "interfaces cm³", "seams mm", "stairs mm²", "findings", "risky mm²")
+COSTS = (
+    "time",
+    "filament m",
+    "plastic g",
+    "support cm³",
+    "interfaces cm³",
+    "seams mm",
+    "stair-stepping mm²",
+    "findings",
+    "risky mm²",
+)
 STANDS_ON = "base cm³"
 CUT = "base: plastic that the interface below the part adds, compared with a print in one piece"
 LAID = ["contact %", "plastic %"]

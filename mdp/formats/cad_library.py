@@ -8,7 +8,7 @@ import signal
 from importlib.util import find_spec
 from pathlib import Path
 
-from mdp.kernels.workers import ONE_CORE, Interpreter, frame, read_frames, take_pipes
+from mdp.kernels.workers import ONE_CORE, Interpreter, frame, read_frames, redirect_stdio
 from profiles.errors import MeshError
 
 CODE = "from mdp.formats.cad_library import answer; answer()"
@@ -41,7 +41,7 @@ def to_glb(path: Path, content: bytes, kind: str) -> bytes:
 
 def answer() -> None:
     """Entry point of the library's process: read a file and answer with (scene, error message)."""
-    requests, answers = take_pipes()
+    requests, answers = redirect_stdio()
     content, kind = next(read_frames(requests))
     answers.write(frame(_loaded(content, kind)))
     answers.flush()

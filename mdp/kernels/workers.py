@@ -176,7 +176,7 @@ class Worker(Interpreter):
                 timer.join()  # it may be ending the worker, which must not be called again then
 
 
-def take_pipes() -> tuple[BinaryIO, BinaryIO]:
+def redirect_stdio() -> tuple[BinaryIO, BinaryIO]:
     """This process's pipes from and to its caller; output printed by tasks does not reach them."""
     requests, answers = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     with open(os.devnull, "r+b") as nowhere:
@@ -201,7 +201,7 @@ def _send(message: bytes) -> None:
 def serve(one_core: bool, idle_s: float) -> None:
     """In a worker: answer calls until no process can call it or the idle time is over."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent decides what Ctrl-C does
-    requests, answers = take_pipes()
+    requests, answers = redirect_stdio()
     _answers.append(answers)
     with suppress(OSError), open(OOM_SCORE[0], "w") as score:
         score.write(OOM_SCORE[1])

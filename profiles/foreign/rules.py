@@ -87,7 +87,7 @@ def _steepest(config: Config, key: str) -> Converted:
 def _found_by_the_slicer(config: Config, key: str) -> Converted:
     """A number; if negative, the slicer computes it."""
     below = (config.number(key) or 0.0) < 0.0
-    return (None, "below 0: worked out by the slicer; ours stays") if below else number(config, key)
+    return (None, "below 0: computed by the slicer; ours stays") if below else number(config, key)
 
 
 def _same_as_top(key_above: str, same: float, convert: Convert) -> Convert:

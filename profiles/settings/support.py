@@ -184,8 +184,8 @@ class Interface(Frozen):
     )
     interface_temperature_add_c: float = simple("Hotter on plastic by", "bond weld temperature adhesion strength", ge=0, le=50)(
         10.0,
-        "temperature added in interface layers, °C; asked for before the table turns and waited for after it. A bond welds as "
-        "long as it is hot, seconds (Ai and Vogt, doi s40964-022-00275-w); heat above the glass transition added 15 % in "
+        "temperature added in interface layers, °C; set before the table turns, reached before printing continues. A bond welds "
+        "as long as it is hot, seconds (Ai and Vogt, doi s40964-022-00275-w); heat above the glass transition added 15 % in "
         "PA-CF (PMC7284967)",
     )
     interface_first_layer_fan: float = advanced(

@@ -203,7 +203,7 @@ def test_from_the_phone_a_model_is_turned_and_a_print_stopped(bench: OpenToNetwo
     browser.wait("document.getElementById('code')")
     browser.value("document.getElementById('code').value = 'WRONG'")
     browser.value("document.querySelector('button').click()")
-    browser.wait("document.getElementById('told')")
+    browser.wait("document.getElementById('refusal')")
     roles = [node for node in browser.accessible() if node["role"] in ("textbox", "button", "alert", "heading")]
     assert [node["role"] for node in roles] == ["heading", "alert", "textbox", "button"]
     assert [node["name"] for node in roles if node["role"] in ("textbox", "button")] == ["Code", "Pair this device"]

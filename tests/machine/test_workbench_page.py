@@ -38,10 +38,11 @@ def choose(browser: "Browser | Firefox", name: str, content: bytes, field: str =
 def open_model(browser: Browser, bench: Running, name: str, content: bytes) -> None:
     browser.open(bench.address)
     browser.wait(f"document.documentElement.dataset.version && {IDLE}")  # the present bench is shown completely
-    before, root = browser.value("document.documentElement.dataset.version"), "document.documentElement.dataset"
+    key = "modules['page/store'].store.state.model?.key"
+    before = browser.value(f"{key} || ''")
     choose(browser, name, content)
-    opened = f"$('title').textContent === {json.dumps(name)} && $('undo').ariaLabel.startsWith('undo: open')"
-    browser.wait(f"{root}.shown && {root}.version > {before} && {opened} && {IDLE}")
+    opened = f"{key} !== {json.dumps(before)} && $('undo').ariaLabel.startsWith('undo: open')"
+    browser.wait(f"document.documentElement.dataset.shown === {key} && {opened} && {IDLE}")
 
 
 def saved(browser: Browser | Firefox, button: str) -> str:

@@ -79,8 +79,8 @@ def test_what_is_no_port_of_a_printer_is_told(sliced: Running, port: str, senten
 
 
 @pytest.mark.parametrize(("journal", "sentence"), [
-    (" ", "no journal is chosen: choose the print that is to go on, or name the journal's file"),
-    ("a\0b", r"'a\x00b' is no file's name: it has a character that no name has"),
+    (" ", "no journal is chosen: choose the print to resume, or name the journal's file"),
+    ("a\0b", r"'a\x00b' is not a file name: it has a character that no name may have"),
 ])  # fmt: skip
 def test_what_is_no_journal_is_told(sliced: Running, journal: str, sentence: str) -> None:
     with prints_line(sliced, "first") as page:
@@ -216,6 +216,12 @@ def test_on_a_phone_nothing_covers_print_now_and_a_print_is_followed_in_a_pictur
         assert browser.value("getComputedStyle($('sure'), '::backdrop').backgroundColor") == "rgba(0, 0, 0, 0)"
         assert browser.value(on_top % "emergency") == "emergency"
         browser.click("#go-on")
+        browser.value("document.activeElement.blur()")
+        browser.key("?")
+        assert browser.value("$('keys').matches(':popover-open')")
+        assert browser.value(on_top % "emergency") == "emergency"  # a click there stops the machine, too
+        browser.click("#keys-close")
+        assert not browser.value("$('keys').matches(':popover-open')")
         browser.value("$('follow').scrollIntoView({ block: 'center' })")
         assert browser.value(on_top % "follow") == "follow"
         browser.press(*browser.middle("#follow"))
@@ -328,7 +334,7 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
         assert asked[1].startswith("look first: all must stand as it was cut off, tip at X")
         by_another_name = "{0}/../{0.name}/{1}".format(Path(ended["journal"]).parent, Path(ended["journal"]).name)
         page.do("go_on", journal=by_another_name, port="/dev/another")
-        assert page.refused() == f"journal {by_another_name}: its print goes on already, or has not ended"
+        assert page.refused() == f"journal {by_another_name}: its print has been resumed already, or has not ended"
         browser.click("#leave")
         browser.wait(f"{PRINTING} === 'over'")
         assert browser.value("$('run-state').textContent") == "nothing was moved or heated"

@@ -194,7 +194,7 @@ def test_a_front_stays_with_what_no_search_reads_its_times_are_worked_out_anew_a
     browser.wait(changed("material.nozzle_c"))
     assert browser.value(row) == before
     put(browser, "process.infill_density", 100)
-    browser.wait(f"{changed('process.infill_density')} && !$('front-told').textContent.includes('worked out anew')")
+    browser.wait(f"{changed('process.infill_density')} && !$('front-told').textContent.includes('computing')")
     after = browser.value(row)
     assert (after[0], after[2:5]) == (before[0], before[2:5])
     assert float(after[6].split()[0]) > float(before[6].split()[0])  # metres of filament

@@ -52,7 +52,7 @@ def print_model(request: ModelRequest, port: str, asked: PrintOptions) -> int:
 def send(request: ModelRequest, address: str, *, start: bool, log: Path | None) -> int:
     """Send a G-code file to a print server. start: start printing at once."""
     if not request.is_gcode:
-        raise GcodeError(f"{request.name} is no G-code file: export makes one of a model, print --port {address} prints it")
+        raise GcodeError(f"{request.name} is not a G-code file: export makes one of a model, print --port {address} prints it")
     server, person = parse_server_address(address), AtTerminal()
     job = _job(request, server, log, starts=start)
     with open_server_printer(job, server, person) as printer:

@@ -90,7 +90,7 @@ class AtTerminal:
         """Whether the user has left by the key l, or by an interrupt without an answer."""
         return self._board.left()
 
-    def gives_up(self) -> bool:
+    def cancels(self) -> bool:
         """Always False: a KeyboardInterrupt ends the print."""
         return False
 

@@ -16,7 +16,7 @@ from mdp.kernels.threads import harmless
 HANGUP: tuple[signal.Signals, ...] = (signal.SIGHUP,) if hasattr(signal, "SIGHUP") else ()
 ALL: tuple[signal.Signals, ...] = (signal.SIGINT, signal.SIGTERM, *HANGUP)
 AGAIN_S = 0.1
-PATIENCE_S = 1.2  # grace period after Ctrl-C: native code notices it only when it has finished
+GRACE_S = 1.2  # grace period after Ctrl-C: native code notices it only when it has finished
 SHOW_CURSOR = "\r\x1b[K\x1b[?25h"
 END = b"\0"  # not a signal number
 COMPILER = f"{os.sep}llvmlite{os.sep}", f"{os.sep}numba{os.sep}"  # path components of their files
@@ -137,11 +137,11 @@ def outside_compiler() -> Iterator[None]:
 
 @contextmanager
 def _hurried(wanted: Callable[[], bool]) -> Iterator[None]:
-    """End the process if the block still runs PATIENCE_S after an interrupt for which wanted() is true."""
+    """End the process if the block still runs GRACE_S after an interrupt for which wanted() is true."""
     over = threading.Event()
 
     def hurry(number: int) -> None:
-        if number == signal.SIGINT and wanted() and not over.wait(PATIENCE_S) and wanted():
+        if number == signal.SIGINT and wanted() and not over.wait(GRACE_S) and wanted():
             end_at_once()
 
     with _overheard(hurry):

@@ -191,7 +191,7 @@ def _arc(reader: Reader, name: str, words: Words) -> None:
     centre = arc_centre(start, end, shape, clockwise)
     radii = [0.0, 0.0] if centre is None else [hypot(p[0] - centre[0], p[1] - centre[1]) for p in (start, end)]
     if centre is None or min(radii) == 0.0 or abs(radii[0] - radii[1]) > ROUND_MM:
-        raise GcodeError(f"{name} is no arc: I and J, or R, must give a centre as far from its beginning as from its end")
+        raise GcodeError(f"{name} is not an arc: I and J, or R, must give a centre equally far from both ends")
     sweep = sweep_rad(start, end, centre, clockwise)
     points = chords(start, end, centre, sweep, chord_count(max(radii), sweep, CHORD_MM))
     reader.at[:] = before

@@ -79,7 +79,7 @@ def refused_line(line: int, command: str, times: int, words: str) -> PrinterErro
 
 def noise(line: int, too_much: str) -> PrinterError:
     """The error for too many repeated lines."""
-    return PrinterError(f"the printer asked for {too_much} again, now for {line}: the cable or the adapter is too noisy")
+    return PrinterError(f"the printer requested {too_much} again, now {line}: the cable or the adapter is too noisy")
 
 
 def implausible_resend(line: int, sent: int, acknowledged: int) -> PrinterError:

@@ -237,7 +237,7 @@ def fetch_picture(url: str) -> tuple[bytes, str]:
             for piece in answer.iter_bytes():
                 body += piece
                 if len(body) > MOST_PICTURE:
-                    raise ServerError(f"the camera gives more than {MOST_PICTURE // 1_000_000} MB: it is no picture")
+                    raise ServerError(f"the camera gives more than {MOST_PICTURE // 1_000_000} MB: it is not a picture")
     except (httpx.HTTPError, httpx.InvalidURL, UnicodeError, OSError) as error:
         raise ServerError(f"the camera does not answer: {plain(str(error)).lower()}") from None
     return body, kind

@@ -110,7 +110,7 @@ def cold_start(pen: Pen) -> Iterator[str]:
     machine is not homed without them."""
     dialect = pen.dialect
     lines, left_out = cold_block(_fill(pen.machine.gcode.start, pen), dialect)
-    yield from (f"; left out, for it may heat: {line}" for line in left_out)
+    yield from (f"; left out because it may heat: {line}" for line in left_out)
     if any(command_in(line) is COMMANDS[TOOL] for line in lines):  # selecting a tool heats it to its active temperature
         yield dialect.nozzle.format(number(0.0))
     for word in dialect.before_start:

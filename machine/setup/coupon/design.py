@@ -151,7 +151,7 @@ def sheet_text(sheet: Sheet) -> str:
     """The sheet as TOML, with instructions."""
     lines = [
         f"# Coupon of {sheet.shape.name} bars. Pull each bar {PULLED[sheet.shape.name]}, until it breaks.",
-        "# In the place of nan comes the load in N: kg of a luggage scale times 9.81. A bar that is left at nan is not used.",
+        "# Replace nan by the load in N: kg of a luggage scale times 9.81. A bar that stays nan is not used.",
         "# Where the plate is printed again, every bar has one more load: [82.0, 78.5].",
     ]
     for key in ("coupon", "machine", "material", "process"):

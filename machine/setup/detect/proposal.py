@@ -159,7 +159,7 @@ def _bed(values: Mapping[str, Reading]) -> dict[str, Reading]:
     spans = [reading.value for reading in reach if reading is not None and isinstance(reading.value, list)]
     if len(spans) < 2:
         return {}
-    source = "worked out: the bed is taken to be as large as X and Y reach"
+    source = "computed: the bed is assumed to be as large as X and Y reach"
     size, middle = [high - low for low, high in spans], [(low + high) / 2.0 for low, high in spans]
     return {"machine.table.size_mm": Reading(rounded(size), source), "machine.tool_mm": Reading(rounded([*middle, 0.0]), source)}
 
@@ -210,11 +210,11 @@ def _reader(config: ConfigText) -> Callable[[ConfigText], Found]:
     if SOURCE.search(config.text):
         raise ProfileError(
             f"{config.name}: it is source that a firmware is built from (Configuration.h, platformio.ini, config.ini), not what "
-            "the printer has stored: the answers to M115, M503 and M211 are expected, saved as a log, or asked for by "
+            "the printer has stored: the answers to M115, M503 and M211 are expected, saved as a log or queried by "
             f"{option('port')}"
         )
     known = [text for _, _, text in READERS]
-    raise ProfileError(f"{config.name}: it is no firmware's configuration: {', '.join(known[:-1])} or {known[-1]} is expected")
+    raise ProfileError(f"{config.name}: not a firmware's configuration: {', '.join(known[:-1])} or {known[-1]} is expected")
 
 
 def _rounded(readings: Mapping[str, Reading]) -> dict[str, Reading]:

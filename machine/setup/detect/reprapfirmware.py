@@ -209,7 +209,7 @@ def _read_commands(config: ConfigText) -> Found:
     if missing:
         board.remarks.append(f"{', '.join(missing)} is not beside it: its settings are unknown")
     if unread:
-        board.remarks.append(f"what it has in braces ({unread}) only the board works out: {option('port')} duet:HOST asks it")
+        board.remarks.append(f"only the board evaluates what it has in braces ({unread}): {option('port')} duet:HOST queries it")
     return board.found(config.name, "M669", "M566", "M143")
 
 

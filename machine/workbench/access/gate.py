@@ -17,7 +17,7 @@ from machine.workbench.access.pairing import Device, Door, Verdict, pairing_page
 PAIRED = "/paired/"  # prefix of the paths that this computer's page has below its token
 UNPAIRED_CODE = 4403  # closes the websocket of an unpaired device
 UNPAIRED = "this device is not paired"
-FOREIGN = "the workbench is asked for by an address or a name of its computer, and by its own pages only\n"
+FOREIGN = "the workbench answers only at an address or name of its computer, and only its own pages\n"
 NOTHING = f"the workbench is below {PAIRED}\n"
 MOST_TYPED = 200  # bytes of a submitted code
 TIMEOUT_S = 10.0  # for receiving a code

@@ -40,8 +40,8 @@ COOKIE_BYTES = 24
 # Contains all that a device may see; pairing_page() removes what does not apply.
 PAGE = (Path(__file__).parent / "pairing.html").read_text("utf-8").replace("{length}", str(CODE_LENGTH))
 STYLE = PAGE.partition("<style>")[2].partition("</style>")[0]
-TOLD, FORM = re.compile(r'<p class="error".*?</p>\n', re.DOTALL), re.compile(r"<form.*?</form>\n", re.DOTALL)
-AFTER_ERROR = 'told hint" aria-invalid="true"'  # attribute of the field while it has an error
+REFUSAL, FORM = re.compile(r'<p class="error".*?</p>\n', re.DOTALL), re.compile(r"<form.*?</form>\n", re.DOTALL)
+AFTER_ERROR = 'refusal hint" aria-invalid="true"'  # attribute of the field while it has an error
 OPEN_NETWORK = re.compile(r'<p class="soft" id="open-network">.*?</p>\n', re.DOTALL)
 
 
@@ -148,7 +148,7 @@ class Door(Observable):
         self._say(f"open to the network, too: a device that opens {' or '.join(self._addresses)} asks for a code: {self._code}")
         if not self.encrypted:
             self._say(
-                f"whoever is in this network can read along: use {option('lan')} in a network of your own only, or with "
+                f"others in this network can read along: use {option('lan')} only in your own network, or with "
                 f"{option('certificate')}"
             )
 
@@ -178,10 +178,10 @@ class Door(Observable):
         """Unpair a device and close its connections. Raises PlanError if it is not paired."""
         paired = next((paired for paired in self.devices if paired.number == device), None)
         if paired is None:
-            raise PlanError("this device is not paired any more")
+            raise PlanError("this device is no longer paired")
         self.devices.remove(paired)
         paired.gone.set()
-        self._say(f"{paired.name} is not paired any more")
+        self._say(f"{paired.name} is no longer paired")
         self.notify()
 
     def reopen(self) -> None:
@@ -220,10 +220,10 @@ STATUS = {Verdict.WRONG: 403, Verdict.SPENT: 403, Verdict.WAITS: 429, Verdict.CL
 
 def pairing_page(door: Door, verdict: Verdict | None = None) -> HTMLResponse:
     """The pairing page. verdict: on the code that this device sent, None: it sent none."""
-    told, wait_s = _told(door, verdict), door.wait_s
+    refusal, wait_s = _refusal(door, verdict), door.wait_s
     body = FORM.sub("", PAGE) if door.pairing.closed else PAGE
     body = OPEN_NETWORK.sub("", body) if door.encrypted else body
-    body = body.replace("{told}", escape(told)) if told else TOLD.sub("", body).replace(AFTER_ERROR, 'hint"')
+    body = body.replace("{refusal}", escape(refusal)) if refusal else REFUSAL.sub("", body).replace(AFTER_ERROR, 'hint"')
     rest = "img-src data:; form-action 'self'; base-uri 'none'; frame-ancestors 'none'"
     headers = {
         "content-security-policy": f"default-src 'none'; style-src {hash_source(STYLE)}; {rest}",
@@ -233,7 +233,7 @@ def pairing_page(door: Door, verdict: Verdict | None = None) -> HTMLResponse:
     return HTMLResponse(body, 200 if verdict is None else STATUS[verdict], headers)
 
 
-def _told(door: Door, verdict: Verdict | None) -> str:
+def _refusal(door: Door, verdict: Verdict | None) -> str:
     """Sentence on why this device cannot be paired, or ""."""
     if door.pairing.closed:
         return "Too many wrong codes were typed: no further device can be paired. The page on the computer can allow it again."

@@ -186,7 +186,7 @@ def move(bench: Bench, *, part: int, normal: Direction, offset_mm: Mm, near: boo
 
 def snap(bench: Bench, part: int, neck: PlannedPart) -> Edit:
     """Replace the plane of a part by the neck found near it."""
-    reason = f"the narrowest section near the plane of part {part} is no place for a cut: "
+    reason = f"the narrowest section near the plane of part {part} is not a place for a cut: "
     return Edit("snap to the narrowest section", [(_replaced(bench, part, neck), part)], reason=reason)
 
 

@@ -25,14 +25,14 @@ ROTATION_ERROR = 1e-6
 def _direction(values: Vector) -> Vector:
     direction = unit_direction(*values)
     if direction is None:
-        raise ValueError(f"{list(values)} is no direction: a length of about 1 is expected")
+        raise ValueError(f"{list(values)} is not a direction: a length of about 1 is expected")
     return direction
 
 
 def _rotation(rows: tuple[Vector, Vector, Vector]) -> tuple[Vector, Vector, Vector]:
     matrix = np.array(rows)
     if not np.allclose(matrix @ matrix.T, np.eye(3), atol=ROTATION_ERROR) or np.linalg.det(matrix) < 0.0:
-        raise ValueError("its rows are no rotation")
+        raise ValueError("its rows are not a rotation")
     return rows
 
 
@@ -64,7 +64,7 @@ def read_command(asked: Asked, commands: Mapping[str, type[Arguments]]) -> tuple
     if not isinstance(name, str):
         raise PlanError("what the page has sent names no command: docs/workbench-protocol.md lists them")
     if name not in commands:
-        raise PlanError(f"{name!r} is no command: docs/workbench-protocol.md lists them")
+        raise PlanError(f"{name!r} is not a command: docs/workbench-protocol.md lists them")
     try:
         return name, commands[name].model_validate(asked)
     except ValidationError as error:

@@ -81,7 +81,7 @@ class Hand:
 
     def _until_let_go(self) -> str:
         """Execute commands; returns the sentence about the end."""
-        while not self._person.lets_go():
+        while not self._person.releases():
             try:
                 command = self._person.by_hand.get_nowait()
             except Empty:

@@ -145,7 +145,7 @@ class Slices:
         try:
             text = self.gcode.read_bytes().decode()
         except FileNotFoundError:
-            raise PlanError("these slices are not there any more: slice what is to be printed again") from None
+            raise PlanError("these slices no longer exist: slice what is to be printed again") from None
         compilers.wait_for(compilers.DRY_RUN)
         lines = tuple(text.removesuffix("\n").split("\n"))
         findings = None if self.known is None else self.known.of(lines, self.profile)
@@ -221,7 +221,7 @@ class AtPage:
         self._checks: tuple[Notice, ...] = ()
         self._lines: deque[str] = deque(maxlen=LINES_KEPT)
         self._answers: SimpleQueue[bool] = SimpleQueue()
-        self._gives_up, self._halts = Flag(), Flag()
+        self._cancels, self._halts = Flag(), Flag()
         self.by_hand: SimpleQueue[HandCommand] = SimpleQueue()  # commands for a printer under manual control
         self.interrupt: Callable[[Command | str], None] = lambda word: None  # called with the command that ends it at once
 
@@ -233,7 +233,7 @@ class AtPage:
         if isinstance(word, Command):
             self.commands.ask(word, value)
         if word in (Command.CANCEL, LEAVE):
-            self._gives_up.set()
+            self._cancels.set()
         if word == LEAVE:
             self.stop.set()
         if word == Command.EMERGENCY_STOP:
@@ -314,13 +314,13 @@ class AtPage:
         """Whether a print on a server is left to it."""
         return self.stop.is_set()
 
-    def lets_go(self) -> bool:
+    def releases(self) -> bool:
         """Whether manual control ends, with the heaters off."""
-        return self.stop.is_set() or self._gives_up.is_set()
+        return self.stop.is_set() or self._cancels.is_set()
 
-    def gives_up(self) -> bool:
+    def cancels(self) -> bool:
         """Whether a print on a server that has not begun is abandoned; after an emergency stop it is not."""
-        return (self._gives_up.is_set() or self.stop.is_set()) and not self._halts.is_set()
+        return (self._cancels.is_set() or self.stop.is_set()) and not self._halts.is_set()
 
     def has_stopped(self) -> bool:
         """Whether an emergency stop was requested and executed, to be called at the end."""

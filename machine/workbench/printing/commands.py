@@ -89,10 +89,10 @@ async def job_of(session: Session, destination: Destination, force: bool, starts
     machine that cannot print there, MoveError where the dry run found errors.
     """
     if session.closed:
-        raise PlanError("this bench is not open any more: print from another one")
+        raise PlanError("this bench is no longer open: print from another one")
     if gcode:
         if session.gcode is None or session.gcode.key != gcode:
-            raise PlanError("this G-code file is not open any more: open it again")
+            raise PlanError("this G-code file is no longer open: open it again")
         sliced = session.gcode
         name = sliced.cost.name
     else:
@@ -114,10 +114,10 @@ def go_on(
     """Query the printer's position, to print the rest of an interrupted print."""
     journal, machine = journal.strip(), machine.strip()
     if not journal:
-        raise JournalError("no journal is chosen: choose the print that is to go on, or name the journal's file")
+        raise JournalError("no journal is chosen: choose the print to resume, or name the journal's file")
     for name in (journal, machine):
         if "\0" in name:
-            raise JournalError(f"{name!r:.100} is no file's name: it has a character that no name has")
+            raise JournalError(f"{name!r:.100} is not a file name: it has a character that no name may have")
     profile = machine_profile(machine) if machine else None
     destination = _destination(port, baud, sim_speed)
     page.prints.begin(page.name, PrintJob(destination, Does.RESUME, profile=profile, cut_off=Path(journal).absolute()))

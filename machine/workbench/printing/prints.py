@@ -117,7 +117,7 @@ class Prints(Observable):
         if job.starts and any(other.job.starts and _same(other.job.destination, at) for other in self.running):
             raise PrinterError(f"port {at.name} prints already: wait until that is done, or cancel it")
         if job.cut_off is not None and realpath(job.cut_off) in map(realpath, self._journals_in_use()):
-            raise PrinterError(f"journal {job.cut_off}: its print goes on already, or has not ended")
+            raise PrinterError(f"journal {job.cut_off}: its print has been resumed already, or has not ended")
         self._forget_old(at)
         self._last_printer = at
         keep_printer(at)
@@ -154,7 +154,7 @@ class Prints(Observable):
         for running in self.prints:
             if running.number == number:
                 return running
-        raise PrinterError("this print is not there any more")
+        raise PrinterError("this print no longer exists")
 
     def _journals_state(self) -> list[dict[str, Any]] | None:
         """Journals that can be resumed, None before they have been requested."""

@@ -24,7 +24,7 @@ from machine.printing.server_print import ServerPrinter, file_name, running_prin
 from machine.quantities import duration, filament_g, price_in_words
 from machine.workbench.printing.at_hand import by_hand
 from machine.workbench.printing.at_page import AtPage, StateReporter, first_state
-from mdp.kernels.workers import listen, read_frames, take_pipes
+from mdp.kernels.workers import listen, read_frames, redirect_stdio
 from profiles.errors import ServerError, UserError
 
 MOST_FINDINGS = 50  # in the list; the page of the print has all
@@ -32,7 +32,7 @@ MOST_FINDINGS = 50  # in the list; the page of the print has all
 
 def main() -> None:
     """Execute one job from the server."""
-    asked, answers = take_pipes()
+    asked, answers = redirect_stdio()
     job: PrintJob | None = next(read_frames(asked), None)
     if job is None:  # the server died before it sent a job
         return

@@ -187,7 +187,7 @@ class RunningPrint:
         except UserError as error:
             self._end(End(PrintState.LEFT, f"{name} was not cancelled: {error}"))
             return
-        nothing = f"there was nothing to cancel: {at.name} prints nothing any more"
+        nothing = f"there was nothing to cancel: {at.name} no longer prints"
         sentence = f"the print was cancelled on {at.name}" if cancelled else nothing
         self._end(End(PrintState.CANCELLED, sentence))
 

@@ -16,7 +16,7 @@ from profiles.errors import PlanError, UserError, reason
 from profiles.files import lock_folder
 
 AFTER_S = 1.0  # so that dragging causes one write
-OPEN_ELSEWHERE = "this work is not kept any more, or another page has opened it"
+OPEN_ELSEWHERE = "this work is no longer kept, or another page has opened it"
 
 
 class Keeping:

@@ -20,6 +20,7 @@ from profiles.frozen import Vector
 
 REST_S = 0.3  # pause in changes of a bench after which it is priced; an interrupted pricing costs a process
 ENDED = "slicing was stopped, for the model on the workbench has changed: slice it again"
+REPLACED = "your planes were replaced: Undo brings them back"
 
 
 class Finding(Derived[Found]):
@@ -57,15 +58,22 @@ class Finding(Derived[Found]):
             return "The search was stopped before it had cut anything: all is as it was."
         taken = with_front(now, [replace(best, chosen=True)])
         self._session.do("stop the search", replace(taken, priced=best.time_s is not None))
-        return f"The search was stopped; the best so far is used: {best.parts} parts."
+        used = f"The search was stopped; the best so far is used: {best.parts} parts"
+        return f"{used}; {REPLACED}." if _replaces_planes(now, taken) else f"{used}."
 
     def _accept_found(self, found: Found) -> None:
         now = self._session.bench
         laid = now if found.turn is None else with_rotation(now, (found.turn @ np.array(now.rotation)).tolist())
         self.laid = None if laid is now else (now.rotation, laid.rotation)
-        after, is_found = with_front(laid, found.front, found.notes), any(planned_parts(row) == now.cuts for row in now.rows)
-        own = [] if is_found else [cut for cut in now.cuts or () if cut not in now.locked]
-        self._session.do("find parts", after, "your planes were replaced: Undo brings them back" if own else "")
+        after = with_front(laid, found.front, found.notes)
+        self._session.do("find parts", after, REPLACED if _replaces_planes(now, after) else "")
+
+
+def _replaces_planes(now: Bench, after: Bench) -> bool:
+    """Whether a search has replaced planes that it did not find itself."""
+    if any(planned_parts(row) == now.cuts for row in now.rows):
+        return False
+    return any(cut not in (after.cuts or ()) for cut in now.cuts or () if cut not in now.locked)
 
 
 def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:

@@ -22,7 +22,7 @@ from profiles.messages import check_text
 MOST_COMMAND = 100_000  # characters
 BEAT_S = 0.5
 _states: WeakKeyDictionary[Observable, tuple[int, str]] = WeakKeyDictionary()
-CLOSED = "this bench is not open any more"
+CLOSED = "this bench is no longer open"
 CLOSED_CODE = 4404  # sent on a websocket of a closed bench
 GONE_CODE = 1006  # code of a websocket that ended without a close frame, RFC 6455
 MOST_OF_DEVICES = 1_000  # characters
@@ -111,7 +111,7 @@ def parsed(text: str, most: int) -> dict[str, Any]:
     except (ValueError, RecursionError):
         asked = None
     if not isinstance(asked, dict):
-        raise PlanError("what the page has sent is no command of the workbench")
+        raise PlanError("the page has sent something that is not a command of the workbench")
     try:
         check_text(json.dumps(asked, ensure_ascii=False))
     except ValueError as error:

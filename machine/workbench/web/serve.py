@@ -175,7 +175,7 @@ def keep_stops_quick() -> None:
 async def _end_prints(prints: Prints, then: Callable[[], None]) -> None:
     there, here = ([job.state.port for job in prints.running if job.state.server is server] for server in (True, False))
     if there:
-        say(f"the print on {' and '.join(there)} goes on there, an upload is broken off")
+        say(f"the print on {' and '.join(there)} continues there, an upload is cancelled")
     if here:
         ports = " and ".join(here)
         say(f"the print at {ports} is stopped and its heaters go off, wait for that; Ctrl-C again does not wait for it")

@@ -118,7 +118,7 @@ async def gcode(session: Session, request: Request) -> Response:
 
 
 def _gone() -> Response:
-    return Response("these slices are not there any more\n", 404)
+    return Response("these slices no longer exist\n", 404)
 
 
 def _once(file: Path, kind: str, name: str) -> Response:

@@ -29,7 +29,7 @@ from mdp.kernels.workers import Tell
 from mdp.mesh import Mesh, together
 from mdp.model_file import DEMO
 from mdp.pedestal import on_pedestal
-from profiles.errors import MeshError, PlanError
+from profiles.errors import MeshError, PlanError, UserError
 from profiles.files import write_whole
 from profiles.machine import Table
 from profiles.part_settings import PartSettings
@@ -121,7 +121,7 @@ def put_on_plate(tell: Tell, bench: Bench, others: Path, drawn: Path) -> Plated:
     known = known_cuts(others) if bench.beside else {}
     try:
         cut = cut_bench(bench, plan_of_bench(bench)) if bench.parts > 1 else uncut(bench.model.name, turned_mesh(bench))
-    except PlanError as error:
+    except UserError as error:
         cut, problem = uncut(bench.model.name, turned_mesh(bench)), f"{error}"
     models = [cut] * bench.copies
     for model, copies in bench.beside:

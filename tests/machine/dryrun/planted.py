@@ -318,6 +318,6 @@ REFUSED = {
     "a speed of 0": (insert(IN_1_20, "G1 X1 Y1 E0.1 F0"), "a feed must be above 0"),
     "a number that is none": (insert(IN_1_20, "G1 Xnan Y1 E0.1"), "Xnan"),
     "a word without its number": (insert(IN_1_20, "G1 X Y1 E0.1"), "without a number"),
-    "an arc without its centre": (insert(IN_1_20, "G2 X1 Y1 E0.1"), "is no arc"),
+    "an arc without its centre": (insert(IN_1_20, "G2 X1 Y1 E0.1"), "is not an arc"),
     "half a line": (insert(IN_1_20, "G1 X12.3 Y-"), "cannot be read"),
 }

@@ -142,7 +142,7 @@ def test_a_macro_before_the_machine_is_homed_is_refused_and_one_after_it_is_left
     lines, left_out = cold_block(["G28", "G92 E0", "LINE_PURGE", "M109 S200"], dialect)
     assert (lines, left_out) == (["G28", "G92 E0"], ["LINE_PURGE"])
     said = list(cold_start(calibration_pen(with_start(KLIPPER, "home_ab\nG28\nLINE_PURGE"))))
-    assert said[0] == "; left out, for it may heat: LINE_PURGE"
+    assert said[0] == "; left out because it may heat: LINE_PURGE"
 
 
 @pytest.mark.parametrize("dialect", ["marlin", "reprapfirmware"])

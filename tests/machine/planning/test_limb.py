@@ -60,7 +60,7 @@ def test_a_z_axis_too_short_for_the_way_over_what_stands_is_told() -> None:
     with pytest.raises(MoveError, match=r"part 2: the way to it needs the tip at Z 25\.2 mm"):
         plan(decomposition, pieces, _without_turns(_short(24.5)))
     with pytest.raises(
-        MoveError, match=r"part 2: a way within it needs the tip at Z 2\d\.\d mm for the head to pass what stands beside"
+        MoveError, match=r"part 2: a travel within it needs the tip at Z 2\d\.\d mm for the head to pass the bodies beside"
     ):
         plan(decomposition, [pieces[0], replace(pieces[1], layers=pieces[1].layers[:20])], _without_turns(_short(25.5)))
 

@@ -255,7 +255,7 @@ def test_a_cable_pulled_out_and_put_back_is_a_terminal_gone_and_back(tmp_path: P
 
 def test_what_is_no_link_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("x")
-    with pytest.raises(PortError, match="mine exists and is no link"), SimulatedPrinter(MACHINE, at=tmp_path / "mine"):
+    with pytest.raises(PortError, match="mine exists and is not a link"), SimulatedPrinter(MACHINE, at=tmp_path / "mine"):
         pass
     assert (tmp_path / "mine").read_text() == "x"
 

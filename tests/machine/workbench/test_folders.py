@@ -231,7 +231,7 @@ def test_kept_work_is_opened_on_one_bench_at_a_time(bench: Bench) -> None:
     async def open_twice() -> None:
         first, second = (Session(bench.profile, bench.given, WorkerPools()) for _ in range(2))
         async with first.keeping.opening(folder):
-            with pytest.raises(PlanError, match="is not kept any more, or another page has opened it"):
+            with pytest.raises(PlanError, match="is no longer kept, or another page has opened it"):
                 async with second.keeping.opening(folder):
                     raise AssertionError("it is open already")
         assert folders_kept() == []  # it belongs to the first session now

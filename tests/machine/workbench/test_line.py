@@ -16,7 +16,7 @@ from tests.machine.running_workbench import workbench
 
 
 def test_a_frame_of_bytes_is_told_to_be_no_command_and_ends_no_line() -> None:
-    no_command = "what the page has sent is no command of the workbench"
+    no_command = "the page has sent something that is not a command of the workbench"
     with workbench() as bench, bench.line() as page, prints_line(bench, "first") as printing:
         page.say(b"\x00")
         assert page.until(lambda state: state["problem"])["problem"] == no_command
@@ -25,7 +25,7 @@ def test_a_frame_of_bytes_is_told_to_be_no_command_and_ends_no_line() -> None:
         printing.say(b"\x00")
         assert printing.refused() == no_command
         printing.do("cancel", print=1)
-        assert printing.refused() == "this print is not there any more"
+        assert printing.refused() == "this print no longer exists"
 
 
 @pytest.mark.parametrize("value", ['"a\\ufdd0b"', '["a\ufdd1"]', '{"\\ufdd2": 1}', '"\\ud800"'])

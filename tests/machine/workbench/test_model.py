@@ -235,6 +235,16 @@ def test_copies_stand_beside_the_model_in_parts_too_and_what_has_no_room_is_told
     assert (len(apart.copies_mm), apart.problem) == (3, "")
 
 
+def test_models_that_cannot_be_put_on_a_pedestal_have_places_and_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse(mesh: Mesh, height_mm: float) -> Mesh:
+        raise MeshError("no feet")
+
+    monkeypatch.setattr("machine.workbench.work.plate.cut_bench", refuse)
+    bench = replace(with_model(Bench(load()), model(mesh=tee())), copies=2, cuts=(PlannedPart((0.0, 0.0, 1.0), 20.0),))
+    stood = plated(bench)
+    assert (len(stood.copies_mm), stood.problem) == (2, "no feet")
+
+
 def test_on_a_pedestal_the_feet_stand_and_its_triangles_are_those_of_a_body_of_its_height() -> None:
     stood = standing(tee(), search__pedestal_mm=10)
     points, faces = np.frombuffer(stood.pedestal, "<u4", 2)

@@ -71,7 +71,7 @@ LINE_LOST = f"""{TWO_PRINTS}
         return [fake.sent(), $('stop-words').textContent];
     }};
 """
-NOT_GIVEN = "THE STOP HAS NOT ARRIVED and is not given any more: press it again, or use the machine's own switch."
+NOT_GIVEN = "THE STOP HAS NOT ARRIVED and is no longer given: press it again, or use the machine's own switch."
 
 
 @needs_node

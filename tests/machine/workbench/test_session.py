@@ -534,6 +534,19 @@ def test_a_search_that_replaces_planes_made_by_hand_says_so_and_how_to_have_them
     assert notes == ["your planes were replaced: Undo brings them back", ""]
 
 
+@pytest.mark.parametrize(("offset_mm", "end"), [(9.0, "; your planes were replaced: Undo brings them back."), (20.0, ".")])
+def test_a_search_that_is_stopped_says_whether_it_has_replaced_planes_made_by_hand(offset_mm: float, end: str) -> None:
+    sentences: list[str] = []
+
+    async def work(session: Session) -> None:
+        session.do("add", with_cuts(session.bench, (PlannedPart(UP, offset_mm),)))
+        best = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0)
+        sentences.append(session.finding.take_best(session.bench, Searched("stage 1", best)))
+
+    when_done(work)
+    assert sentences == [f"The search was stopped; the best so far is used: 2 parts{end}"]
+
+
 def test_a_search_that_begins_in_the_instant_in_which_another_is_stopped_goes_on() -> None:
     found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
 

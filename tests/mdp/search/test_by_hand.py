@@ -216,6 +216,8 @@ def test_an_offset_next_to_nothing_is_refused() -> None:
 def test_a_plan_with_a_plane_left_open_is_sent_to_the_search() -> None:
     assert "part 2 has no offset_mm: decompose --planes mine.toml finds it" in _refusal(shapes.tee(), (LEANING, None))
     assert "part 2 has no normal" in _refusal(shapes.tee(), (None, 20.0))
+    with pytest.raises(PlanError, match=r"^part 2 has no offset_mm: "):  # a plan that is in no file
+        cut_by_plan(shapes.tee(), "shape", _profile(), SearchRequest(plan=replace(_by_hand((LEANING, None)), name="")))
 
 
 def test_an_open_offset_is_found_where_the_most_becomes_safe() -> None:

@@ -31,8 +31,8 @@ from profiles.machine import Machine
 from profiles.profile import load
 
 FOUND = ("machine.turn.point_mm", "machine.tilt.point_mm", "machine.tilt.zero_deg")
-INTRO = f"""Look at each pad with its holes above: one hole is pad 1. Below it and to its right, count which of its notches goes
-on as a groove of the roof, from the long one in the middle: 1, 2, ... to the right and up, -1, -2, ... to the left and down.
+INTRO = f"""Look at each pad with its holes above: one hole is pad 1. Below it and to its right, find the notch that continues
+as a groove of the roof; count from the long one in the middle: 1, 2, ... to the right and up, -1, -2, ... to the left and down.
 Then measure how high the pad's top stands over the roof beside it, mm. {EXPECTED.capitalize()}; b goes back.
 """
 

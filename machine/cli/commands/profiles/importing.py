@@ -17,7 +17,7 @@ from profiles.places import own_folder
 
 LONGEST_TEXT = 40  # longest imported value in the table
 WIDTH = 100
-AS_IT_IS, WORKED_OUT, LEFT = "taken as it is", "worked out", "left"
+AS_IT_IS, WORKED_OUT, LEFT = "taken as it is", "computed", "left"
 
 
 def import_profiles(request: ImportRequest) -> int:

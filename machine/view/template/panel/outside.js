@@ -23,7 +23,7 @@ export function outsideOf({ scene, findings, code, chooseTheme, camera, bells })
   for (const turned of ["pointerup", "keyup", "click"]) addEventListener(turned, () => say("view", { yaw: camera.yaw, pitch: camera.pitch }));
   let asked = false;
   listen("click", { "tab-code": () => { if (!asked && code.needed()) say("text"); asked = true; } });
-  addEventListener("keydown", (event) => { if (event.key === "Escape" && !$("help").open) say("leave"); });
+  addEventListener("keydown", (event) => { if (event.key === "Escape" && !$("help").matches(":popover-open")) say("leave"); });
   say("ready");
 }
 

@@ -77,9 +77,9 @@ export function keysOf({ scene, camera, player, look, fit, chooseTheme }) {
     PageUp: layer(1), PageDown: layer(-1), Home: () => scene.go(0), End: () => scene.go(Infinity),
     t: press("show-travels"), s: press("show-seams"), m: press("show-machine"), b: press("show-beads"),
     r: () => { $("frame").value = scene.riding ? "machine" : "workpiece"; $("frame").dispatchEvent(new Event("change")); },
-    f: fit, d: () => chooseTheme(!scene.dark), "?": () => $("help").showModal(),
+    f: fit, d: () => chooseTheme(!scene.dark), "?": () => $("help").showPopover(),
   };
-  onKeys(keys, () => $("help").open);
+  onKeys(keys, () => $("help").matches(":popover-open"));
   listen("click", { "help-button": keys["?"] });
 }
 

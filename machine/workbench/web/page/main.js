@@ -134,10 +134,10 @@ const CONTROLS = { z: "undo", y: "redo", r: "slice", g: "save-gcode", o: "open" 
 function keysOf(camera, picture) {
   const click = (id) => () => $(id).click();
   onKeys({
-    ...viewKeys(camera, picture ? picture.ask : () => {}), f: click("fit"), d: click("theme"), r: click("show-rings"), n: click("neck"), "?": () => $("keys").showModal(),
+    ...viewKeys(camera, picture ? picture.ask : () => {}), f: click("fit"), d: click("theme"), r: click("show-rings"), n: click("neck"), "?": () => $("keys").showPopover(),
     Escape: () => update({ clicks: "", corner: null, part: 0, hand: null }),
-  }, () => document.querySelector("dialog[open], :popover-open") || document.activeElement?.closest("[data-typing]"));
-  listen("click", { "keys-button": () => $("keys").showModal(), open: () => $("file").click() });
+  }, () => document.querySelector(":popover-open") || document.activeElement?.closest("[data-typing]"));
+  listen("click", { "keys-button": () => $("keys").showPopover(), open: () => $("file").click() });
   addEventListener("keydown", (event) => {
     const name = CONTROLS[event.key.toLowerCase()], steps = ["undo", "redo"].includes(name);
     if (!(event.ctrlKey || event.metaKey) || event.altKey || !name || (steps ? event.target.closest?.("[data-typing]") : event.shiftKey)) return;

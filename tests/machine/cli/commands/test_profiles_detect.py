@@ -217,7 +217,7 @@ def test_who_does_not_tell_its_settings_here_is_one_sentence(
 def test_a_file_of_another_kind_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out, file = tmp_path / "my.toml", tmp_path / "other"
     file.write_text("solid cube\nendsolid\n")
-    assert "it is no firmware's configuration" in refusal(capsys, out, file)
+    assert "not a firmware's configuration" in refusal(capsys, out, file)
     file.write_bytes(b"\0\1\2")
     assert "a text of less than 4 MiB is expected" in refusal(capsys, out, file)
     assert "cannot be read (no such file" in refusal(capsys, out, tmp_path / "none")

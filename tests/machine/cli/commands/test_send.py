@@ -134,7 +134,7 @@ def test_a_server_that_prints_is_told_of_before_any_work(capsys: pytest.CaptureF
 @pytest.mark.parametrize(
     ("words", "sentence"),
     [
-        (["send", "box.stl", "--to", "octoprint:octopi"], "box.stl is no G-code file: export makes one"),
+        (["send", "box.stl", "--to", "octoprint:octopi"], "box.stl is not a G-code file: export makes one"),
         (["send", str(MARLIN), "--to", "prusalink:host"], "octoprint:HOST, moonraker:HOST or duet:HOST"),
         (
             ["print", str(MARLIN), "--port", "octoprint:octopi", "--journal", "j"],
@@ -246,7 +246,7 @@ def test_an_upload_that_is_broken_off_tells_what_the_server_has(
 
 def test_a_person_who_gives_up_breaks_the_upload_off(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     class GivingUp(AtTerminal):
-        def gives_up(self) -> bool:
+        def cancels(self) -> bool:
             return True
 
     with stand_in("octoprint") as (job, address), session_with(address) as server:

@@ -103,7 +103,7 @@ def test_a_file_in_the_way_of_the_link_stays(tmp_path: Path, capsys: pytest.Capt
     (tmp_path / "link").symlink_to(tmp_path / "mine")
     for name in ("mine", "link"):
         assert main(["simulator", "--pty", str(tmp_path / name)]) == 1
-        assert "is no link to a terminal" in capsys.readouterr().err
+        assert "is not a link to a terminal" in capsys.readouterr().err
     assert (tmp_path / "link").read_text() == "x"
 
 

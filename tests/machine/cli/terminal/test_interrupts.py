@@ -13,7 +13,7 @@ from collections.abc import Callable
 import pytest
 
 from machine.cli.terminal import interrupts
-from machine.cli.terminal.interrupts import COMPILER, PATIENCE_S, calling, interrupting, outside_compiler, stopping
+from machine.cli.terminal.interrupts import COMPILER, GRACE_S, calling, interrupting, outside_compiler, stopping
 
 BUSY_S = 30.0
 
@@ -143,7 +143,7 @@ def test_work_in_native_code_is_ended_with_the_process() -> None:
         process.send_signal(signal.SIGINT)
         assert process.communicate()[1] == "tiltprint: interrupted\n"
     assert process.returncode == 130
-    assert PATIENCE_S < 2.0  # how long a user waits at most
+    assert GRACE_S < 2.0  # how long a user waits at most
     assert time.monotonic() - began_s < BUSY_S  # a bound for a busy machine; without the interrupt it would take minutes
 
 

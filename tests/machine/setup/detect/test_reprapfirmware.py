@@ -124,7 +124,7 @@ def test_what_only_the_board_works_out_is_said() -> None:
     told = found(CRADLE.replace("S290", "S{global.hot}"))
     assert "nozzle_limit_c" not in told.settings
     assert [*map(terminal_words, told.remarks)] == [
-        "what it has in braces (1) only the board works out: --port duet:HOST asks it"
+        "only the board evaluates what it has in braces (1): --port duet:HOST queries it"
     ]
 
 

@@ -60,7 +60,7 @@ def test_an_unpaired_device_gets_one_page_without_scripts_and_nothing_else() -> 
             assert "<script" not in page.text
             assert network.code not in page.text
             assert "default-src 'none'" in page.headers["content-security-policy"]
-            assert "whoever is in this network can read along" in page.text
+            assert "others in this network can read along" in page.text
             for path in ("/paired/", "/paired/1/", "/paired/1/model/x", "/favicon.ico", "/pair"):
                 assert (await device.get(path)).headers["location"] == "/"
                 assert (await device.get(path, headers={"accept": "*/*"})).status_code == 403

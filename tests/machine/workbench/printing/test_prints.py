@@ -291,7 +291,7 @@ class Heard:
     (PrintJob(parse_destination("duet:127.0.0.1:9"), Does.FOLLOW), "duet:127.0.0.1:9: nothing listens on 127.0.0.1", False),
     (order("octoprint:127.0.0.1:9"), "octoprint:127.0.0.1:9: nothing listens on 127.0.0.1 at port 9: is OctoPrint", False),
     (order("sim", "G28\nG1 X500 F600\n", force=False), "the dry run found 1 error, the first: X goes to 500 mm", True),
-    (order("sim", file=Path("gone.gcode")), "these slices are not there any more: slice what is to be printed", False),
+    (order("sim", file=Path("gone.gcode")), "these slices no longer exist: slice what is to be printed", False),
 ])  # fmt: skip
 def test_what_print_refuses_is_refused_with_its_sentence(wanted: PrintJob, sentence: str, forcible: bool) -> None:
     heard = Heard()
@@ -518,7 +518,7 @@ def test_only_the_page_that_commands_a_print_may_say_anything_to_it_but_to_stop_
     prints = prints_with_one()
     with pytest.raises(PrinterError, match="another page controls this print"):
         obey(page_of(prints, "other"), {**GIVEN, "do": name, "print": 1})
-    with pytest.raises(PrinterError, match="this print is not there any more"):
+    with pytest.raises(PrinterError, match="this print no longer exists"):
         obey(page_of(prints), {**GIVEN, "do": name, "print": 2})
     obey(page_of(prints, "other"), {"do": "take", "print": 1})
     assert prints.prints[0].holder == "other"

@@ -113,7 +113,7 @@ function openDevicesLine() {
   let until = 0; // time of the next check of the codes
   const line = lineAt("devices", (told) => {
     if (told.problem) return;
-    tell({ "network-told": `A device that opens ${told.addresses.join(" or ")} is asked for the code that the terminal shows.${told.encrypted ? "" : " Whoever is in this network can read along."}` });
+    tell({ "network-told": `A device that opens ${told.addresses.join(" or ")} is asked for the code that the terminal shows.${told.encrypted ? "" : " Others in this network can read along."}` });
     Object.assign($("network-code"), { src: told.qr_code, hidden: false });
     clearTimeout(until);
     tellPairing(told);

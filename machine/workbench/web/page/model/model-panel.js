@@ -109,13 +109,14 @@ export function placePanel(picture) {
   const putFar = (place) => { put(place); picture?.fit(); }; // it may be out of view there
   fields.forEach((field) => field.addEventListener("change", () => putFar(fields.map(({ value }) => Number(value)))));
   $("place-middle").addEventListener("click", () => putFar(MIDDLE));
-  onState(({ plate_told: extent }) => tell({ "place-told": extent }));
-  let told = "", copies = [[...MIDDLE, 0]]; // their positions; the first one is the model that the user turns, cuts and marks
-  subscribe(({ state }, before) => {
-    const now = JSON.stringify(placeNow());
-    if (state.copies_mm) copies = state.copies_mm.map((place) => [...place, 0]); // unknown just after the model was turned
-    picture?.place(add([...placeNow(), 0], copies[0]), store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])), [...placeNow(), 0], state.misplaced);
-    if (state.misplaced && !before.state?.misplaced) picture?.fit();
+  let told = "", lost = false, copies = [[...MIDDLE, 0]]; // their positions; the first one is the model that the user turns, cuts and marks
+  subscribe(({ state }) => {
+    const now = JSON.stringify(placeNow()), stood = lost;
+    if (state.copies_mm) [copies, lost] = [state.copies_mm.map((place) => [...place, 0]), state.misplaced]; // unknown just after a change
+    const [x, y] = add([...placeNow(), 0], copies[0]);
+    tell({ "place-told": copies[0].some(Boolean) ? `${state.plate_told} To make room for the others, it is printed at X ${x.toFixed(1)}, Y ${y.toFixed(1)} mm.` : state.plate_told });
+    picture?.place([x, y, 0], store.turning ? [] : copies.slice(1).map((place) => sub(place, copies[0])), [...placeNow(), 0], lost);
+    if (lost && !stood) picture?.fit();
     if (now === told) return;
     told = now;
     fields.forEach((field, axis) => { field.value = placeNow()[axis]; });

@@ -22,7 +22,7 @@ export function modelFetcher(picture, again) {
   const take = (triangles, key) => {
     const missing = key && !triangles;
     if (missing) setTimeout(again, AGAIN_MS);
-    notice(missing ? "The model has not come from tiltprint, so it is not drawn yet; it is asked for again." : "", "model");
+    notice(missing ? "The model has not come from tiltprint, so it is not drawn yet; it is requested again." : "", "model");
     picture?.show(triangles);
     update({ triangles });
     picture?.fit();

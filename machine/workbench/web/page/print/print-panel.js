@@ -302,7 +302,7 @@ function stopsAsked(prints, send, isOpen) {
       late = setTimeout(doubt, ANSWER_MS);
     },
     /** A stop has waited too long for a connection, or its print no longer exists. */
-    expired: () => { if (stopped().some(going)) say("THE STOP HAS NOT ARRIVED and is not given any more: press it again, or use the machine's own switch."); },
+    expired: () => { if (stopped().some(going)) say("THE STOP HAS NOT ARRIVED and is no longer given: press it again, or use the machine's own switch."); },
     told: () => { if (stopped().length && !stopped().some(going)) say(stopped().map(({ name, sentence }) => `${name}: ${sentence}.`).join(" ")); },
   };
 }

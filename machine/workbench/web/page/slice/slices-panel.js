@@ -148,7 +148,7 @@ export function saveMenu() {
     const { errors } = store.state.sliced;
     tell({ "errors-title": `The dry run found ${errors.length} error${errors.length === 1 ? "" : "s"}` });
     listIn("errors-list", errors.slice(0, 3));
-    $("save-anyway").showModal();
+    $("save-anyway").showPopover();
   };
   onData("save", ({ save: address }) => save(address));
   listen("click", { "save-gcode": () => (store.state.sliced.errors.length ? confirm() : save("print.gcode")), "save-errors": () => save("print.gcode?force=yes") });
