@@ -307,9 +307,11 @@ def cut_by_plan(mesh: Mesh, name: str, profile: Profile, request: SearchRequest)
         plan = replace(plan, parts=plan.row(wanted))
     for number, part in enumerate(plan.parts, start=2):
         if part.plane is None:
-            missing, command = "normal" if part.normal is None else "offset_mm", f"decompose --planes {plan.name or 'PLAN'}"
-            found = phrase("found by the search", f"{command} finds it")
-            raise PlanError(f"{plan.label}part {number} has no {missing}: {found}")
+            missing, file = "normal" if part.normal is None else "offset_mm", plan.name or "PLAN"
+            raise PlanError(
+                f"{plan.label}part {number} has no {missing}: "
+                f"{phrase('found by the search', f'decompose --planes {file} finds it')}"
+            )
     mesh = on_pedestal(mesh, profile.search.pedestal_mm)
     check_plan(plan, mesh, name)
     problem = Problem(mesh, profile, plan.zones)

@@ -71,7 +71,7 @@ def test_a_command_that_is_none_is_told_and_ends_nothing(bench: Running) -> None
     with bench.line() as page:
         for text in ("", "[]", "{", '"undo"', "[" * 50_000):
             page.say(text)
-        page.until(lambda state: "no command of the workbench" in state["problem"])
+        page.until(lambda state: "not a command of the workbench" in state["problem"])
         page.do("demo", name="/etc/passwd")
         page.until(lambda state: state["problem"].startswith("/etc/passwd: only the models that ship"))
 
