@@ -214,7 +214,7 @@ def test_decompose_writes_what_the_contract_names(folder: Path) -> None:
     assert all(Path(name).read_bytes().startswith(b"\x89PNG") for name in ("parts.png", "sheet.png", "front.png"))
 
 
-def test_decompose_compares_the_sliced_parts_with_one_piece_and_tells_how_their_joints_lie(
+def test_decompose_compares_the_sliced_parts_with_one_piece_and_reports_their_joint_contact(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
@@ -247,7 +247,7 @@ def test_options_of_the_search_are_its_profile_keys(folder: Path, capsys: pytest
 
 
 @pytest.mark.parametrize("command", [["decompose"], ["export", "-o", "a.gcode"]])
-def test_a_time_limit_of_nothing_prints_one_part_and_says_so(
+def test_a_zero_time_limit_prints_one_part_and_reports_it(
     folder: Path, capsys: pytest.CaptureFixture[str], command: list[str]
 ) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
@@ -269,7 +269,7 @@ def test_export_twice_gives_the_same_bytes_and_a_file_that_simulates(folder: Pat
     assert first == again
 
 
-def test_several_models_are_exported_as_one_plate_and_a_number_stands_for_copies(folder: Path) -> None:
+def test_several_models_are_exported_as_one_plate_and_a_number_gives_the_copies(folder: Path) -> None:
     Path("large.stl").write_bytes(stl(shapes.box(30, 20, 2)))
     Path("small.stl").write_bytes(stl(shapes.box(10, 10, 1)))
     plate = ["--as-is", *FAST, "--set", "process.skirt_loops=0"]
@@ -304,7 +304,7 @@ def test_g_code_on_standard_output_is_the_file_alone(folder: Path, capsys: pytes
     assert not Path("-").exists()
 
 
-def test_every_command_is_told_in_one_line_of_a_narrow_screen(
+def test_every_command_is_described_in_one_line_of_a_narrow_screen(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("COLUMNS", "80")
@@ -366,7 +366,7 @@ STAYS = [
 @pytest.mark.parametrize(
     "arguments", STAYS, ids=["turned by the profile", "seams that cost nothing", "the paper's terms", "planes by hand"]
 )
-def test_a_model_stays_as_it_is_where_something_says_how_it_lies(folder: Path, arguments: list[str]) -> None:
+def test_a_model_is_not_reoriented_if_an_option_sets_its_orientation(folder: Path, arguments: list[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     Path("planes.toml").write_text("version = 1\n")
     assert main(["decompose", "tee.stl", *arguments, *COARSE, "--json", "out.json"]) == 0

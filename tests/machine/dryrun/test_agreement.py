@@ -56,7 +56,7 @@ def test_a_box_printed_two_tenths_aside_is_within_half_a_line_and_one_farther_as
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro", "trident_5axis"])
-def test_a_table_whose_centre_lies_elsewhere_puts_tilted_parts_outside_the_model(machine: str) -> None:
+def test_a_table_with_another_centre_puts_tilted_parts_outside_the_model(machine: str) -> None:
     profile, decomposition, _, _ = printed(machine)
     lines = [line for line in text(machine) if not line.startswith("; ")]  # without comments that would reveal it
     x, y, z = profile.machine.tilt.point_mm
@@ -72,7 +72,7 @@ def untold(lines: Lines) -> Lines:
 
 
 @pytest.mark.parametrize(("index", "letter", "by_mm"), [(1, "X", 0.5), (1, "Y", -0.2), (2, "X", 0.2), (3, "Y", 0.5)])
-def test_a_shifted_part_is_told_and_the_others_lie_where_they_should(index: int, letter: str, by_mm: float) -> None:
+def test_a_shifted_part_is_reported_and_the_others_are_in_place(index: int, letter: str, by_mm: float) -> None:
     profile, model, lines = bent("generic_ac")
     moved = on(part(index), word(letter, lambda x: x + by_mm))(untold(list(lines)))
     sizes = {part: np.linalg.norm(by) for part, (_, by) in shifts(dry_run(moved, profile), triangle_tree(model)).items()}
@@ -95,7 +95,7 @@ def wedge() -> Mesh:
     return mesh_of(m3.Manifold.hull_points(np.array(corners)))
 
 
-def test_walls_of_another_slope_on_each_side_lie_half_their_width_inside_the_model() -> None:
+def test_walls_with_different_slopes_on_each_side_are_half_their_width_inside_the_model() -> None:
     lines = ["G28", "M83", "M104 S200", "M109 S200", ";TYPE:Outer wall", ";WIDTH:0.4", ";HEIGHT:0.2"]
     for layer in range(50):
         left = 0.2 * (layer + 0.5) - 9.8  # in the middle of the layer
@@ -106,7 +106,7 @@ def test_walls_of_another_slope_on_each_side_lie_half_their_width_inside_the_mod
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "gen5x", "linuxcnc_xyzac"])
-def test_an_untouched_part_lies_where_its_model_does(machine: str) -> None:
+def test_an_unchanged_part_is_where_its_model_is(machine: str) -> None:
     profile, model, lines = bent(machine)
     found = shifts(dry_run(lines, profile), triangle_tree(model))
     assert np.array([shift_mm for _, shift_mm in found.values()]) == pytest.approx(np.zeros((3, 3)), abs=0.01)

@@ -38,7 +38,7 @@ def richer(part: int, layer: int, factor: float) -> Lines:
 
 
 @pytest.mark.parametrize("turn_deg", [0.0, 17.0, 90.0])
-def test_no_plastic_is_lost_wherever_a_bar_lies(turn_deg: float) -> None:
+def test_no_plastic_is_lost_wherever_a_bar_is(turn_deg: float) -> None:
     lattice, turn = lattice_over(FIELD, 0.05), radians(turn_deg)
     ways = [
         ((2.0 + 0.01 * k, 5.0), (2.0 + 0.01 * k + size * cos(turn), 5.0 + size * sin(turn)))
@@ -109,7 +109,7 @@ def test_the_section_of_an_interface_is_the_face_that_the_parts_share() -> None:
 
 
 @pytest.mark.parametrize("factor", [0.7, 1.5])
-def test_a_first_layer_with_another_flow_has_so_much_more_plastic_over_its_room(factor: float) -> None:
+def test_a_changed_first_layer_flow_changes_its_plastic_per_room_by_the_same_factor(factor: float) -> None:
     good, bad = faces(list(bent("generic_ac")[2])), faces(richer(2, 1, factor))
     assert bad[0].over_room / good[0].over_room == pytest.approx(factor, rel=0.06)
     assert bad[1].over_room == pytest.approx(good[1].over_room, rel=0.02)
@@ -130,7 +130,7 @@ def test_other_axes_and_firmwares_show_the_same_interfaces() -> None:
     assert contact[0] == pytest.approx(contact[1], abs=0.01)
 
 
-def test_outer_walls_of_blocks_on_each_other_lie_on_plastic() -> None:
+def test_outer_walls_of_stacked_blocks_rest_on_plastic() -> None:
     profile, _, lines = bent("generic_ac")
     run = dry_run(lines, profile, known=())
     held, inside_mm = wall_edges(next(interfaces(run.program, run.deposited, profile)))

@@ -75,7 +75,7 @@ def test_a_move_across_the_rim_of_a_tilted_table_is_not_missed() -> None:
     assert [f.line for f in dry_run(through.splitlines(), profile).findings if f.code == "collision"] == [4]
 
 
-def test_beside_the_table_s_edge_the_head_may_go_below_its_plane() -> None:
+def test_outside_the_table_s_edge_the_head_may_go_below_its_surface() -> None:
     profile = _with(Head(nozzle_mm=0.4, silhouette_mm=[(5.0, 0.0)], boxes=[]), 50.0)
     program = "G28\nG0 Z50 F600\nG0 X57\nG0 Z-20\nG0 X50"
     assert [(f.code, f.line) for f in dry_run(program.splitlines(), profile).findings] == [("collision", 5)]
@@ -103,7 +103,7 @@ def test_a_purge_line_at_the_plate_s_edge_makes_no_mountain_of_the_print(kind: s
 
 
 @pytest.mark.parametrize("turn", ["C10000000", "A30 C10000000"])
-def test_a_turn_of_ten_million_degrees_is_tried_as_far_as_the_axis_goes(turn: str) -> None:
+def test_a_turn_of_ten_million_degrees_is_checked_up_to_the_axis_limit(turn: str) -> None:
     found = dry_run(["G28", "G92 A0 C0", "G1 Z5 F600", f"G1 {turn} F600"], GENERIC).findings
     assert {(f.code, f.line) for f in found} >= {("axis-limit", 4)}
     assert ("A30" in turn) == any(f.code == "collision" and "while the table turns" in f.message for f in found)

@@ -24,11 +24,11 @@ def test_a_travel_through_an_earlier_line_is_found() -> None:
 
 
 @pytest.mark.parametrize("moves", ["G0 X-20\nG0 Z60\nG0 X20", "G0 X-20\nG0 Z58\nG0 X-6", "G0 X-20\nG0 Z59.7\nG0 X20"])
-def test_above_beside_and_within_a_bead_s_width_is_clear(moves: str) -> None:
+def test_travel_above_next_to_and_within_a_bead_s_width_is_clear(moves: str) -> None:
     assert not _contacts(moves)
 
 
-def test_the_hot_end_s_flank_counts_at_its_own_height() -> None:
+def test_the_hot_end_s_flank_is_checked_at_its_own_height() -> None:
     # 2.75 mm beside the line the flank hangs 1.5 mm above the tip, 1.37 mm above the bead's edge
     assert not _contacts("G0 X-20\nG0 Z58.5\nG0 X-2.75")
     depth = float(_contacts("G0 X-20\nG0 Z58\nG0 X-2.75")[0].message.split()[3])
@@ -42,5 +42,5 @@ def test_a_box_of_the_head_counts_where_it_is() -> None:
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
-def test_our_own_program_touches_nothing(machine: str) -> None:
+def test_a_generated_program_touches_nothing(machine: str) -> None:
     assert not [f for f in dry_run(text(machine), printed(machine)[0]).findings if f.code == "contact"]

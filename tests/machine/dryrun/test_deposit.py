@@ -36,7 +36,7 @@ def test_a_void_is_outside() -> None:
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
-def test_our_own_print_lies_inside_its_model(machine: str) -> None:
+def test_a_generated_print_is_inside_its_model(machine: str) -> None:
     profile, decomposition, _, _ = printed(machine)
     beyond_mm, length_mm, _ = pieces_outside(dry_run(text(machine), profile), triangle_tree(decomposition.mesh), 0.0)
     assert (beyond_mm == 0.0).all()
@@ -50,6 +50,6 @@ def test_a_line_half_outside_counts_half() -> None:
     assert set(rows.tolist()) == {2}
 
 
-def test_nothing_extruded_has_no_pieces() -> None:
+def test_a_program_without_extrusion_has_no_pieces() -> None:
     beyond_mm, length_mm, rows = pieces_outside(dry_run(["G28", "G0 X1 Y1 F600"], load()), triangle_tree(shapes.box()), 0.4)
     assert (len(beyond_mm), len(length_mm), len(rows)) == (0, 0, 0)

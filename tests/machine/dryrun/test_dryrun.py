@@ -76,7 +76,7 @@ def test_a_short_piece_between_two_lines_is_ramped_through_without_stopping() ->
     assert times == pytest.approx([one, 1.0 / slow, one], rel=1e-3)
 
 
-def test_the_acceleration_told_lengthens_the_ramps() -> None:
+def test_a_given_acceleration_lengthens_the_ramps() -> None:
     rows = np.zeros((1, 6))
     rows[0, 0] = 100.0
     times = move_times(rows, np.array([100.0]), np.zeros(1, dtype=bool), MACHINE, np.array([500.0]))
@@ -117,7 +117,7 @@ def _codes(text: str) -> list[str]:
         ("G1 X5 E0.1 F600\nG28", "homing-over-print", 7),
     ],
 )
-def test_a_planted_fault_is_found_by_its_own_code_and_line(moves: str, code: str, line: int) -> None:
+def test_a_planted_fault_is_found_with_its_code_and_line(moves: str, code: str, line: int) -> None:
     found = dry_run((BEGIN + moves + END).splitlines(), CLEAN).findings
     assert {(finding.code, finding.line) for finding in found if finding.code != "air"} == {(code, line)}
 
@@ -134,7 +134,7 @@ def test_a_rectangular_plate_ends_at_its_sides_not_at_its_corners() -> None:
     assert ["off-plate" in found for found in codes] == [False, True]
 
 
-def test_a_purge_beside_the_plate_is_no_fault() -> None:
+def test_a_purge_next_to_the_plate_is_not_a_fault() -> None:
     assert _codes(BEGIN + ";TYPE:Custom\nG0 X101 F3000\nG0 Z0.2 F600\nG1 X110 E0.1" + END) == []
 
 
@@ -160,7 +160,7 @@ def test_homing_across_after_a_print_is_no_fault() -> None:
     assert _codes(BEGIN + "G1 X5 E0.1 F600\nG28 X Y" + END) == []
 
 
-def test_the_same_fault_of_several_bodies_is_told_once() -> None:
+def test_the_same_fault_of_several_bodies_is_reported_once() -> None:
     messages = [finding.message for finding in dry_run((BEGIN + "G0 Z-50" + END).splitlines(), CLEAN).findings]
     assert len(messages) == len(set(messages)) > 1
 
@@ -171,7 +171,7 @@ def test_moves_before_homing_are_found() -> None:
     assert _codes("G28 X Y\nG92 Z5\nG0 X1 Y1 F600\nG0 Z2") == []
 
 
-def test_extruding_before_the_nozzle_was_waited_for_is_found() -> None:
+def test_extruding_before_waiting_for_the_nozzle_is_found() -> None:
     assert _codes("G28\nM104 S210\nM83\nG1 Z5 F600\nG1 X5 E0.1\nM104 S0") == ["cold-extrusion"]
 
 
@@ -189,13 +189,13 @@ def test_uncalibrated_numbers_are_named_as_a_warning() -> None:
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
-def test_our_own_program_has_no_errors(machine: str) -> None:
+def test_a_generated_program_has_no_errors(machine: str) -> None:
     profile, lines = whole(machine)
     assert [finding.code for finding in dry_run(lines, profile).findings] == ["uncalibrated"]
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "fractal5pro"])
-def test_the_plastic_lies_where_the_slicer_put_it(machine: str) -> None:
+def test_the_plastic_is_where_the_slicer_put_it(machine: str) -> None:
     profile, decomposition, sliced, _ = printed(machine)
     run = dry_run(text(machine), profile)
     wanted = []
@@ -246,7 +246,7 @@ def test_a_place_that_no_printer_reaches_is_refused_with_its_line(line: str) -> 
 
 
 @pytest.mark.parametrize("rows_at_once", [7, 1000])
-def test_rows_are_judged_alike_however_many_are_judged_at_once(rows_at_once: int, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_are_judged_the_same_in_batches_of_any_size(rows_at_once: int, monkeypatch: pytest.MonkeyPatch) -> None:
     profile, _, lines = bent("generic_ac")
     faults = [fault.edit(list(lines)) for fault in FAULTS if fault.name in ("a layer missing", "no fans")]
     programs = [lines, *faults, [line for line in lines if not line.startswith((";WIDTH", ";HEIGHT"))]]

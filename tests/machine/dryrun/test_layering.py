@@ -42,14 +42,14 @@ def stepped(settings: tuple[str, ...]) -> tuple[Profile, tuple[str, ...]]:
 
 
 @pytest.mark.parametrize("settings", SETTINGS, ids=lambda settings: settings[0])
-def test_a_sound_print_has_no_finding_whatever_it_spans(settings: tuple[str, ...]) -> None:
+def test_a_sound_print_has_no_finding_whatever_it_bridges(settings: tuple[str, ...]) -> None:
     profile, lines = stepped(settings)
     run = dry_run(lines, profile)
     assert [f.message for f in run.errors] == []
     assert not {"air", "gap"} & {f.code for f in run.findings}
 
 
-def test_a_roof_far_above_all_that_lies_below_it_is_found_though_it_is_a_bridge() -> None:
+def test_a_roof_far_above_everything_below_it_is_found_although_it_is_a_bridge() -> None:
     part = whole(standing(m3.Manifold.cube((20, 20, 10))))
     profile = load(settings=("process.walls=0", "process.infill_density=0"))
     decomposition = Decomposition("", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)
@@ -69,7 +69,7 @@ def test_a_bridge_on_support_is_sound_however_large_the_gap_between_them(gap_mm:
 
 @pytest.mark.parametrize("settings", TELLING, ids=lambda settings: settings[0])
 @pytest.mark.parametrize("layer", range(3, 24, 4))
-def test_a_layer_without_its_beads_is_found_at_the_next_one(settings: tuple[str, ...], layer: int) -> None:
+def test_a_layer_without_its_beads_is_found_at_the_next_layer(settings: tuple[str, ...], layer: int) -> None:
     profile, lines = stepped(settings)
     gone = layers_of(list(lines), 1)[layer - 1]
     edited = [line for k, line in enumerate(lines) if k not in gone or not re.match("G1 .*E", line)]
@@ -78,7 +78,7 @@ def test_a_layer_without_its_beads_is_found_at_the_next_one(settings: tuple[str,
 
 @pytest.mark.parametrize("layer", [20, 40])
 @pytest.mark.parametrize("rise_mm", [0.1, -0.1])
-def test_a_layer_at_the_wrong_height_is_found_though_support_is_laid_before_the_part(layer: int, rise_mm: float) -> None:
+def test_a_layer_at_the_wrong_height_is_found_although_support_is_printed_before_the_part(layer: int, rise_mm: float) -> None:
     profile, lines = stepped(("process.support_least_mm2=2",))
     moved = layers_of(list(lines), 1)[layer - 1]
     assert any(";TYPE:Support material" in lines[k] for k in moved)
@@ -95,7 +95,7 @@ def test_a_crumb_on_top_of_a_part_is_no_missing_layer(length_mm: float, codes: s
 
 
 @pytest.mark.parametrize(("y_mm", "codes"), [(5.0, set()), (0.0, {"gap"})])
-def test_what_stands_on_support_that_ends_as_high_as_the_part_is_no_missing_layer(y_mm: float, codes: set[str]) -> None:
+def test_a_layer_on_support_as_high_as_the_part_is_not_reported_as_a_gap(y_mm: float, codes: set[str]) -> None:
     lines = ["G28", "M109 S210", "M83", ";PART:1 of 1", ";WIDTH:0.45", ";HEIGHT:0.2", "G0 Z0.2 F600"]
     for z_mm in (0.2, 0.4):
         for kind, y in (("Perimeter", 0.0), ("Support material interface", 5.0)):

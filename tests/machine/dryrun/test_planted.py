@@ -9,7 +9,7 @@ from tests.machine.dryrun.planted import FAULTS, REFUSED, Fault
 
 
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.name)
-def test_a_planted_fault_is_found_where_it_is(fault: Fault) -> None:
+def test_a_planted_fault_is_found_at_its_place(fault: Fault) -> None:
     profile, _, lines = bent("generic_ac")
     found = [f for f in dry_run(fault.edit(list(lines)), profile).findings if f.code == fault.code]
     assert (fault.severity, fault.part, True) in {(f.severity, f.part, fault.layer in (0, f.layer) and f.line > 0) for f in found}
@@ -28,7 +28,7 @@ def test_other_firmwares_and_other_axes_hide_no_fault(name: str, machine: str) -
 
 
 @pytest.mark.parametrize("name", REFUSED)
-def test_what_is_no_gcode_is_refused_with_its_line(name: str) -> None:
+def test_invalid_gcode_is_refused_with_its_line_number(name: str) -> None:
     profile, _, lines = bent("generic_ac")
     edit, sentence = REFUSED[name]
     with pytest.raises(GcodeError, match=rf"line \d+.*{sentence}"):

@@ -65,7 +65,7 @@ def test_the_depth_of_a_level_move_is_the_exact_one_within_half_a_bead_and_a_cel
 
 @settings(deadline=None, max_examples=30)
 @given(st.lists(st.tuples(PLACE, PLACE), min_size=1, max_size=3), PLACE, PLACE, st.floats(0, 60), st.floats(60, 90))
-def test_blocks_in_order_of_their_height_hide_nothing_whatever_is_laid_later(lines, start, end, down: float, z: float) -> None:
+def test_sorting_blocks_by_height_gives_the_same_depth_after_later_deposits(lines, start, end, down: float, z: float) -> None:
     depths, a, b = [], np.array([*start, 80.0 - down]), np.array([*end, 80.0 - down])
     for order in (lambda field: field, highest_first):
         field = order(_field(lines[1:], 80.0))
@@ -76,9 +76,7 @@ def test_blocks_in_order_of_their_height_hide_nothing_whatever_is_laid_later(lin
 
 @settings(deadline=None, max_examples=30)
 @given(PLACE, PLACE, st.floats(60, 90), st.floats(60, 90))
-def test_a_slanting_move_goes_deeper_than_at_its_highest_end_and_no_deeper_than_at_its_lowest(
-    start, end, z0: float, z1: float
-) -> None:
+def test_a_slanting_move_s_depth_is_between_those_of_its_highest_and_lowest_end(start, end, z0: float, z1: float) -> None:
     lines = [((-15.0, 0.0), (15.0, 0.0))]
     depth = _depth(np.array([*start, z0]), np.array([*end, z1]), 0.0, _field(lines, 80.0), head_of(MACHINE))
     assert _exact_depth(lines, 80.0 - max(z0, z1), start, end, -CELL_MM) - 1e-6 <= depth
@@ -113,20 +111,20 @@ def test_a_bead_above_nothing_hangs_in_air_along_all_its_length(z: float) -> Non
     assert [f.code for f in run.findings if f.severity == "error"] == ["air"]
 
 
-def test_what_hangs_is_told_apart_as_the_part_and_its_support() -> None:
+def test_unsupported_part_and_support_lengths_are_reported_separately() -> None:
     first, high = ";LAYER_CHANGE\nG1 X20 E1.5 F600\n", ";LAYER_CHANGE\nG0 Z5\nG0 Y20\nG1 X-20 E1.5\n"
     run = _run(f"{first}{high}G0 Y30\n;TYPE:Support material\nG1 X0 E0.75")
     (message,) = (finding.message for finding in run.findings if finding.code == "air")
     assert message.endswith("40.0 mm of the part, 20.0 mm of its support")
 
 
-def test_a_bead_beside_one_in_air_is_carried_by_it_and_one_farther_off_is_not() -> None:
+def test_a_bead_next_to_one_in_air_is_supported_by_it_but_a_farther_one_is_not() -> None:
     assert _sums(_run("G1 X20 E1.5 F600\nG0 Y0.4\nG1 X-20 E1.5", 5.0)) == pytest.approx([40.0, 0.0, 40.0])
     assert _sums(_run("G1 X20 E1.5 F600\nG0 Y0.9\nG1 X-20 E1.5", 5.0)) == pytest.approx([80.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize(("shift", "air"), [(0.0, 0.0), (0.3, 0.0), (0.6, 40.0)])
-def test_a_bead_on_another_is_carried_until_it_stands_beside_it(shift: float, air: float) -> None:
+def test_a_bead_on_another_is_supported_until_it_is_next_to_it(shift: float, air: float) -> None:
     assert _sums(_run(f"G1 X20 E1.5 F600\nG0 Z0.4\nG0 Y{shift}\nG1 X-20 E1.5"))[0] == pytest.approx(air)
 
 

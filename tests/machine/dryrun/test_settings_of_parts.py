@@ -14,19 +14,19 @@ def codes(edit: Edit, **of_part_2: float) -> set[str]:
     return {f.code for f in run.errors} - {"contents"}
 
 
-def test_less_flow_on_an_interface_is_asked_for_by_its_part():
+def test_reduced_interface_flow_is_expected_if_set_for_its_part():
     less = on(layers(2, 1), word("E", lambda e: 0.5 * e, "G1 .*[XY].*E[0-9]"))
     assert codes(less) == {"extrusion"}
     assert codes(less, interface_flow=0.5 * 1.1) == set()
 
 
-def test_a_hotter_interface_is_asked_for_by_its_part():
+def test_a_hotter_interface_is_expected_if_set_for_its_part():
     hotter = insert(IN_2_1, "M104 S255")
     assert codes(hotter) == {"temperature"}
     assert codes(hotter, interface_temperature_add_c=50.0) == set()
 
 
-def test_layers_on_plastic_without_fan_are_asked_for_by_their_part():
+def test_interface_layers_without_fan_are_expected_if_set_for_their_part():
     still = on(layers(2, 1, 15), fan_off)
     assert codes(still) == {"fan"}
     assert codes(still, interface_fan=0.0, interface_layers=40) == set()

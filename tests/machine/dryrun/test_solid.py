@@ -43,24 +43,24 @@ def distances_mm(points: Floats, mesh: Mesh) -> Floats:
 
 @settings(max_examples=12)
 @given(seeds)
-def test_a_point_lies_inside_where_the_surface_winds_about_it(seed: int) -> None:
+def test_a_point_is_inside_if_the_surface_winds_around_it(seed: int) -> None:
     mesh = random_solid(seed)
     points = points_about(mesh, seed)
     assert np.array_equal(inside(points, triangle_tree(mesh)), windings(points, mesh) > 0.5)
 
 
 @pytest.mark.parametrize(("mesh", "z_mm", "within"), [(box(), 10.0, True), (hollow(), 10.0, False), (hollow(), 2.0, True)])
-def test_a_point_right_above_the_edges_of_faces_lies_inside_all_the_same(mesh: Mesh, z_mm: float, within: bool) -> None:
+def test_a_point_right_above_face_edges_is_correctly_classified(mesh: Mesh, z_mm: float, within: bool) -> None:
     assert inside(np.array([(0.0, 0.0, z_mm), (1.0, 1.0, z_mm), (-2.0, 2.0, z_mm)]), triangle_tree(mesh)).tolist() == [within] * 3
 
 
-def test_a_point_right_below_a_corner_of_faces_lies_inside_all_the_same() -> None:
+def test_a_point_right_below_a_face_corner_is_correctly_classified() -> None:
     sphere = ball(10.0, 24)
     top = sphere.vertices[sphere.vertices[:, 2].argmax()]
     assert inside(top + np.array([(0.0, 0.0, -1.0), (0.0, 0.0, 1.0)]), triangle_tree(sphere)).tolist() == [True, False]
 
 
-def test_a_point_in_two_bodies_that_overlap_lies_inside_below_the_face_of_either() -> None:
+def test_a_point_in_either_of_two_overlapping_bodies_is_inside() -> None:
     low, high = box(20.0, 20.0, 20.0), box(20.0, 20.0, 20.0)
     both = Mesh(
         np.vstack([low.vertices, high.vertices + np.array([5.0, 0.0, 5.0])]),
@@ -70,7 +70,7 @@ def test_a_point_in_two_bodies_that_overlap_lies_inside_below_the_face_of_either
     assert inside(points, triangle_tree(both)).tolist() == [True, True, True, False, False]
 
 
-def test_a_point_in_a_body_that_is_inside_out_lies_outside() -> None:
+def test_a_point_in_an_inside_out_body_is_outside() -> None:
     right = box(20.0, 20.0, 20.0)
     inside_out = Mesh(right.vertices, right.faces[:, ::-1])
     assert [inside(np.array([(2.0, 1.0, 9.0)]), triangle_tree(mesh)).tolist() for mesh in (right, inside_out)] == [
@@ -102,7 +102,7 @@ def test_no_points_have_no_distance() -> None:
 
 @settings(max_examples=15)
 @given(seeds)
-def test_a_point_is_filled_where_it_lies_in_some_bar_below_its_segment(seed: int) -> None:
+def test_a_point_is_filled_if_it_is_in_a_bar_below_its_segment(seed: int) -> None:
     rng = np.random.default_rng(seed)
     count = 40
     ups = rng.normal(size=(count, 3))
@@ -129,7 +129,7 @@ def test_a_point_is_filled_where_it_lies_in_some_bar_below_its_segment(seed: int
 
 @settings(max_examples=30)
 @given(st.integers(0, 10**6), st.integers(60, 400))
-def test_a_shift_is_found_beside_a_constant_and_among_walls_that_lie_elsewhere(seed: int, count: int) -> None:
+def test_a_shift_is_found_despite_a_constant_offset_and_outlier_walls(seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     normals = rng.normal(size=(count, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
@@ -140,7 +140,7 @@ def test_a_shift_is_found_beside_a_constant_and_among_walls_that_lie_elsewhere(s
     assert found == pytest.approx(shift, abs=0.03)
 
 
-def test_a_direction_in_which_no_wall_faces_is_not_told_and_few_walls_tell_nothing() -> None:
+def test_a_shift_along_a_direction_no_wall_faces_is_zero_and_too_few_walls_give_none() -> None:
     turns = 2.0 * np.pi * np.arange(100) / 100
     level = np.column_stack([np.cos(turns), np.sin(turns), np.zeros(100)])
     assert fit_shift(level, level @ (0.3, -0.1, 9.0) + 0.1) == pytest.approx([0.3, -0.1, 0.0], abs=1e-6)

@@ -43,7 +43,7 @@ def test_the_printer_runs_dry_as_often_as_predicted(segment_mm: float, feed: int
     assert int(slowed.sum()) == pytest.approx(record.slowed, rel=0.12, abs=2)
 
 
-def test_a_line_that_takes_no_time_lets_the_moves_take_their_own() -> None:
+def test_lines_with_no_transfer_time_do_not_slow_the_moves() -> None:
     lines = circles(0.5, 3600, 400)
     run = dry_run(lines, PROFILE)
     assert feeding(run.program, lines, MACHINE, 1e12)[1] == pytest.approx(run.time_s, rel=0.03)

@@ -14,7 +14,7 @@ PROGRAM = [
 TIMELINE = Timeline(dry_run(PROGRAM, PROFILE))
 
 
-def test_what_is_left_after_a_line_are_the_moves_and_dwells_behind_it() -> None:
+def test_the_time_left_after_a_line_is_that_of_the_following_moves_and_dwells() -> None:
     run = dry_run(["G21", "G90", "M83", "G28", "G1 X60 F600", "G4 S5", "G1 X0 F600", "G4 S7"], PROFILE)
     timeline, ends_s = Timeline(run), run.times_s
     assert timeline.remaining_s(0) == pytest.approx(run.time_s)
@@ -22,15 +22,15 @@ def test_what_is_left_after_a_line_are_the_moves_and_dwells_behind_it() -> None:
     assert timeline.remaining_s(7) == pytest.approx(7.0)
 
 
-def test_the_way_to_a_part_is_no_layer_of_it() -> None:
+def test_travel_to_a_part_is_not_counted_as_its_layer() -> None:
     assert [TIMELINE.layers(part) for part in (1, 2, 3, None)] == [2, 1, None, None]
 
 
 @pytest.mark.parametrize(("line", "place"), [(11, (10.0, 0.0, 0.0)), (15, (20.0, 0.0, 0.0)), (99, (30.0, 30.0, 120.0))])
-def test_the_axes_stand_where_the_last_move_before_a_line_has_left_them(line: int, place: tuple[float, ...]) -> None:
+def test_the_axes_are_where_the_last_move_before_a_line_left_them(line: int, place: tuple[float, ...]) -> None:
     assert tuple(TIMELINE.at(line)[letter] for letter in "XAC") == place
 
 
 @pytest.mark.parametrize("line", [0, 10])
-def test_before_the_first_move_it_is_not_known_where_they_stand(line: int) -> None:
+def test_before_the_first_move_the_axis_positions_are_unknown(line: int) -> None:
     assert TIMELINE.at(line) == {}

@@ -15,7 +15,7 @@ def ring(z_mm: float) -> str:
 
 
 @pytest.mark.parametrize(("missing", "codes"), [((), set()), ((7, 8), {"air"})])
-def test_the_layers_of_a_file_that_tells_none_are_those_of_its_beads(missing, codes):
+def test_layers_of_a_file_without_layer_comments_are_found_from_its_beads(missing, codes):
     rings = [ring(0.35 + 0.3 * k) for k in range(12) if k not in missing]
     run = dry_run([*BEGIN.split("\n"), *"\n".join(rings).split("\n"), *END.split("\n")], load(machine="three_axis"))
     assert {f.code for f in run.errors} == codes

@@ -9,7 +9,7 @@ from tests.machine.dryrun.planted import before_turn
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "gen5x", "linuxcnc_xyzac"])
-def test_one_wait_stands_behind_each_turn_and_the_wish_before_it(machine: str) -> None:
+def test_each_turn_sets_the_temperature_before_and_waits_once_after(machine: str) -> None:
     profile, _, lines = bent(machine)
     hot_c = f"{profile.material.nozzle_c + profile.process.interface_temperature_add_c:g}"
     for part in (2, 3):

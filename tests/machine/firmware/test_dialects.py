@@ -78,7 +78,7 @@ def golden(dialect: str, coordinates: str) -> list[str]:
 
 
 @EACH
-def test_every_word_of_a_firmware_stands_as_in_the_golden_text(dialect: str, coordinates: str) -> None:
+def test_every_command_of_a_firmware_matches_the_golden_file(dialect: str, coordinates: str) -> None:
     file = GOLDEN / f"every_word_{dialect}_{coordinates}.gcode"
     assert golden(dialect, coordinates) == file.read_text(encoding="ascii").splitlines()
 
@@ -104,7 +104,7 @@ def test_read_back_tip_and_filament_are_the_program_s(dialect: str, coordinates:
 
 
 @EACH
-def test_every_turn_is_one_row_at_the_planned_pace_and_the_head_stands_still(dialect: str, coordinates: str) -> None:
+def test_every_turn_is_one_row_at_the_planned_speed_and_the_head_does_not_move(dialect: str, coordinates: str) -> None:
     _, _, parsed = both(dialect, coordinates)
     turns = np.flatnonzero(parsed.kind == MoveKind.ROTATE)
     change = parsed.end[turns] - parsed.start[turns]
@@ -123,7 +123,7 @@ def test_heat_comes_before_plastic_and_ends_with_the_file(dialect: str, coordina
 
 
 @EACH
-def test_nothing_of_our_own_text_is_unknown(dialect: str, coordinates: str) -> None:
+def test_generated_gcode_contains_nothing_unknown(dialect: str, coordinates: str) -> None:
     assert both(dialect, coordinates)[2].ignored == {}
 
 
@@ -235,6 +235,6 @@ def test_followed_places_and_axis_positions_are_each_other_s_inverse(tilt: float
 
 
 @given(PLACE)
-def test_with_the_table_level_followed_places_are_axis_positions(point: tuple) -> None:
+def test_with_a_level_table_workpiece_coordinates_are_axis_positions(point: tuple) -> None:
     machine = profile("linuxcnc", "workpiece").machine
     assert followed_places(machine, Pose(0.0, 0.0), np.array([point])) == pytest.approx(np.array([point]), abs=1e-9)

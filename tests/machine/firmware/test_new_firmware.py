@@ -41,7 +41,7 @@ def test_the_dry_run_reads_its_text_as_the_same_print_as_marlin_s(profile: Profi
     assert [finding.code for finding in made_up.findings] == [finding.code for finding in marlin.findings]
 
 
-def test_its_text_is_streamed_to_its_own_simulated_printer(profile: Profile) -> None:
+def test_its_program_is_streamed_to_its_simulated_printer(profile: Profile) -> None:
     lines = list(write_gcode(printed()[3], profile))
     printer = VirtualPrinter(profile.machine)
     outcome = print_lines(lines, PATH, medium=printer.medium, profile=profile)
@@ -52,13 +52,13 @@ def test_its_text_is_streamed_to_its_own_simulated_printer(profile: Profile) -> 
     assert np.ptp(record.end[:, 3]) > 80.0
 
 
-def test_its_simulated_printer_answers_in_its_own_words(profile: Profile) -> None:
+def test_its_simulated_printer_answers_with_its_own_messages(profile: Profile) -> None:
     simulated = SimulatedFirmware(profile.machine)
     simulated.receive(b"G2 X1\n")
     assert simulated.advance() == b"what is G2 X1?\nok\n"
 
 
-def test_its_own_name_gives_the_sender_its_rules_of_the_line(profile: Profile) -> None:
+def test_its_name_selects_its_line_rules_in_the_sender(profile: Profile) -> None:
     assert identify("FIRMWARE_NAME:Made-Up 1.1 by somebody") is MADE_UP
     connection = Connection()
     connection.receive(b"FIRMWARE_NAME:Made-up 1.0\n", 0.0)
@@ -73,7 +73,7 @@ def test_its_words_for_following_the_table_are_remembered_for_a_resume(profile: 
     assert not state.follows
 
 
-def test_its_calibration_waits_for_a_person_in_its_words(profile: Profile) -> None:
+def test_its_calibration_waits_for_the_user_with_its_own_command(profile: Profile) -> None:
     lines = list(calibration_lines(profile, plan_touches(profile.machine, 20.0)))
     first = next(k for k, line in enumerate(lines) if line.startswith("M118 touch 1 "))
     assert lines[first + 1] == "M1"

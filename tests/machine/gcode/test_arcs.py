@@ -67,7 +67,7 @@ def test_a_finely_sampled_circle_becomes_two_arcs() -> None:
     assert strokes == ["G3", "G3"]
 
 
-def test_without_the_setting_no_arc_is_written() -> None:
+def test_without_the_setting_no_arcs_are_written() -> None:
     lines, _ = _program(_turning(1), load())
     assert not [line for line in lines if line.startswith(("G2 ", "G3 "))]
 
@@ -115,7 +115,7 @@ def test_chords_stay_within_their_tolerance_of_the_arc(radius: float, sweep: flo
 
 
 @given(st.floats(-50, 50), st.floats(-50, 50), st.floats(1.0, 3.0), st.booleans())
-def test_the_centre_by_radius_is_as_far_from_both_ends_and_gives_the_shorter_way_round(
+def test_the_centre_of_an_r_arc_is_equidistant_from_both_ends_and_gives_the_shorter_arc(
     x: float, y: float, factor: float, clockwise: bool
 ) -> None:
     apart = float(np.hypot(x, y))

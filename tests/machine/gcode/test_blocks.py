@@ -31,7 +31,7 @@ def test_a_program_with_the_blocks_of_another_firmware_is_not_written() -> None:
     assert str(refused.value) == MARLIN_IN_LINUXCNC
 
 
-def test_an_own_machine_that_inherits_another_firmware_s_blocks_is_refused_before_any_work(
+def test_a_user_machine_that_inherits_another_firmware_s_blocks_is_refused_before_any_work(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     own, out = tmp_path / "mill.toml", tmp_path / "out.gcode"
@@ -77,12 +77,12 @@ def test_a_line_is_refused_where_its_firmware_refuses_it(dialect: str, line: str
 
 
 @pytest.mark.parametrize("dialect", ["marlin", "reprapfirmware"])
-def test_axes_set_where_they_stand_after_a_restart_are_held_by_their_motors_first(dialect: str) -> None:
+def test_after_a_restart_motors_are_enabled_before_axis_positions_are_set(dialect: str) -> None:
     motors, axes = dialects()[dialect].stands
     assert (motors, axes.split()[0]) == ("M17", "G92")
 
 
-def test_a_table_levelled_by_hand_is_held_by_its_motors_from_the_start() -> None:
+def test_the_motors_of_a_manually_levelled_table_are_enabled_from_the_start() -> None:
     """Marlin (planner.cpp) and RepRapFirmware energise a motor by its first move, not by G92: the first part has no turn."""
     starts = {name: filled_start(load(machine=name)) for name in shipped("machine")}
     levelled = {name: lines for name, lines in starts.items() if any(re.match(r"G92 [ABCUV]0", line) for line in lines)}

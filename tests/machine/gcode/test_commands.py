@@ -78,7 +78,7 @@ def spellings(line: str) -> set[str]:
 
 
 @of(HEATING)
-def test_what_heats_or_waits_for_heat_is_found_in_every_spelling(dialect: str, line: str) -> None:
+def test_a_command_that_heats_or_waits_for_heat_is_recognized_in_every_spelling(dialect: str, line: str) -> None:
     assert {heat_in(spelled, dialects()[dialect]) for spelled in spellings(line)} == {Heat.HEATS}
 
 
@@ -88,7 +88,7 @@ def test_macros_files_cycles_and_what_is_not_known_may_heat(dialect: str, line: 
 
 
 @of(COLD)
-def test_what_neither_heats_nor_waits_for_heat_is_cold(dialect: str, line: str) -> None:
+def test_a_command_that_neither_heats_nor_waits_for_heat_is_cold(dialect: str, line: str) -> None:
     assert heat_in(line, dialects()[dialect]) is Heat.COLD
 
 
@@ -106,7 +106,7 @@ def cold_homing(profile: Profile) -> list[list[str]]:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_that_may_heat_is_sent_by_a_cold_procedure_on_any_shipped_machine(name: str) -> None:
+def test_a_cold_procedure_of_a_shipped_machine_sends_no_command_that_may_heat(name: str) -> None:
     profile = load(name)
     machine = profile.machine
     touching = [list(calibration_lines(profile, plan_touches(machine, 30.0)))] if machine.tilts else []
@@ -115,7 +115,7 @@ def test_nothing_that_may_heat_is_sent_by_a_cold_procedure_on_any_shipped_machin
 
 
 @pytest.mark.parametrize("name", HOMED)
-def test_a_cold_procedure_stays_cold_whatever_heats_in_the_start_block(name: str) -> None:
+def test_a_cold_procedure_stays_cold_even_if_the_start_block_heats(name: str) -> None:
     profile, dialect = load(name), dialect_of(load(name).machine)
     heating = [line for line in HEATING[profile.machine.dialect] if "{" not in line]  # a placeholder in a block
     for spelled in sorted(spelled for line in heating for spelled in spellings(line)):
@@ -162,7 +162,7 @@ def test_a_tool_is_selected_cold_when_its_temperature_has_been_set_to_nothing() 
     assert lines.index("M568 P0 S0") < lines.index("T0")
 
 
-def test_whatever_the_reader_or_the_simulated_printer_does_has_a_row() -> None:
+def test_every_command_of_the_reader_and_the_simulated_printer_is_in_the_table() -> None:
     matched = [node.value.value for node in ast.walk(ast.parse(getsource(do_command))) if isinstance(node, ast.MatchValue)]
     assert "G1" in matched
     names = {*matched, *NOTED, *WITHOUT_EFFECT, *MACROS, *MODES, *SIMULATED}
@@ -179,11 +179,11 @@ def switches(dialect: Dialect) -> list[str]:
 
 
 @pytest.mark.parametrize("line", ["M112", "m112", "M0112", "M00", "M 0", "M410 ; now"])
-def test_what_the_sender_alone_may_give_is_refused_in_every_spelling(line: str) -> None:
+def test_a_command_reserved_for_the_sender_is_refused_in_every_spelling(line: str) -> None:
     with pytest.raises(LocalProtocolError, match="remove it from the program"):
         command_of(line, 1)
 
 
 @pytest.mark.parametrize(("line", "name"), [("g1x5", "G1"), ("G01 X5", "G1"), ("m0104s200", "M104"), ("T3", "T")])
-def test_a_command_is_found_however_it_is_spelled(line: str, name: str) -> None:
+def test_a_command_is_found_in_every_spelling(line: str, name: str) -> None:
     assert command_in(line) is EVERY[name]

@@ -34,7 +34,7 @@ def test_a_gcode_file_that_cannot_be_read_is_one_sentence(tmp_path: Path, conten
         GcodeFile(tmp_path / "p").lines()
 
 
-def test_old_letters_in_comments_and_texts_are_printed_and_told_once(tmp_path: Path) -> None:
+def test_cp1252_letters_in_comments_and_messages_are_sent_as_ascii_and_reported_once(tmp_path: Path) -> None:
     wanted = ["G28 ; Größe", "M117 Düse heiß", "M117 Düse kühl", "G1 X5 F60"]
     (tmp_path / "p").write_bytes("\n".join(wanted).encode("cp1252"))
     lines = GcodeFile(tmp_path / "p").lines()

@@ -323,7 +323,7 @@ def test_a_command_is_read_as_itself_and_a_plain_line_too(lines: list[str]) -> N
     ("%", "", ""),
     ("(only words)", "", ""),
 ])  # fmt: skip
-def test_a_line_is_taken_apart_in_one_way(line: str, command: str, comment: str | None) -> None:
+def test_a_line_is_split_into_command_and_comment(line: str, command: str, comment: str | None) -> None:
     if comment is None:
         with pytest.raises(GcodeError, match="has checksum ''"):
             read_line(line)
@@ -342,13 +342,13 @@ def test_a_line_is_taken_apart_in_one_way(line: str, command: str, comment: str 
     ("M104 S200.5.2", "line 1: 'M104 S200.5.2': behind M104 only letters with a number are allowed"),
     ('M98 P"a;b.g"', "line 1: 'M98 P\"a;b.g\"' has a ';' between quotes, where some firmwares begin a comment: remove it"),
 ])  # fmt: skip
-def test_what_firmwares_read_differently_is_refused_with_its_line(line: str, sentence: str) -> None:
+def test_a_line_that_firmwares_read_differently_is_refused_with_its_line_number(line: str, sentence: str) -> None:
     with pytest.raises(GcodeError) as error:
         parse_gcode([line], MACHINES["marlin"])
     assert str(error.value) == sentence
 
 
-def test_an_uploaded_line_stays_as_it_is_where_every_firmware_reads_it_alike() -> None:
+def test_an_uploaded_line_is_unchanged_if_every_firmware_reads_it_the_same() -> None:
     lines = ["G1 X1.5 E0.1", "  M104 S200 ; hot", "; (a remark)", "M117 Düse (heiß)", "", 'echo "a"']
     assert GcodeUpload("a.gcode", lines).content.decode().splitlines() == lines
 
@@ -367,7 +367,7 @@ MOVE = "MANUAL_STEPPER STEPPER=stepper_a"
 
 
 @pytest.mark.parametrize("rest", ["# MOVE=5", "MOVE = 5", "MOVE=(5)", "'MOVE=5'", "MOVE=5 SYNC"])
-def test_a_macro_that_klipper_reads_otherwise_is_refused(rest: str) -> None:
+def test_a_macro_that_klipper_reads_differently_is_refused(rest: str) -> None:
     with pytest.raises(GcodeError, match=r"line 1: .MANUAL_STEPPER .*: behind MANUAL_STEPPER only KEY=VALUE is allowed"):
         parse_gcode([f"{MOVE} {rest}"], MACHINES["klipper"])
 

@@ -76,7 +76,7 @@ READERS = (read_by_dry_run, read_by_host, read_by_simulator)
         ("marlin", "G1 X1E5", [5]),
     ],
 )
-def test_what_a_word_of_filament_pushes(read, dialect: str, text: str, pushed_mm: list[float]) -> None:
+def test_how_much_filament_an_e_word_pushes(read, dialect: str, text: str, pushed_mm: list[float]) -> None:
     machine = MACHINES[dialect]
     places = read([*from_zero(machine), *text.split("|")], machine)
     assert [coordinates[E_AXIS] for coordinates in places] == pytest.approx(pushed_mm)
@@ -128,7 +128,7 @@ def commands(draw: st.DrawFn, machine: Machine) -> list[tuple[str, list[tuple[st
 @EACH
 @settings(deadline=None, max_examples=60)
 @given(data=st.data())
-def test_any_sequence_of_modes_and_moves_is_read_alike(dialect: str, data: st.DataObject) -> None:
+def test_all_readers_agree_on_any_sequence_of_modes_and_moves(dialect: str, data: st.DataObject) -> None:
     machine = MACHINES[dialect]
     model, blank = Model(machine), data.draw(st.sampled_from([" ", ""]))
     sequence = data.draw(commands(machine))
@@ -154,7 +154,7 @@ def test_the_host_takes_nothing_but_bounded_numbers(word: str, x: float | None) 
     assert modal.at[0] == x
 
 
-def test_a_feed_told_in_millimetres_is_told_again_in_inches() -> None:
+def test_a_feed_set_in_millimetres_is_restored_in_inches() -> None:
     modal = ModalState(axes_of(None))
     for command in ("G21", "G1 F2540", "G20"):
         modal.take(command)

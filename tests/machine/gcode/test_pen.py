@@ -81,7 +81,7 @@ def test_a_stroke_that_rounding_shortens_is_slowed_only_where_its_filament_is_to
     assert line.split(" F")[1] == str(feed)
 
 
-def test_texts_stand_before_their_paths_and_behind_the_last() -> None:
+def test_texts_precede_their_paths_and_the_last_one_follows_all_paths() -> None:
     points: Floats = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0]])
     two = Paths(
         points, np.array([0, 0.5, 0, 0.5]), np.array([0, 2, 4]), np.array([0, 0], np.int8), np.full(2, 20.0), np.full(2, 1e9)
@@ -90,7 +90,7 @@ def test_texts_stand_before_their_paths_and_behind_the_last() -> None:
     assert text.splitlines() == [";first", "G1 X1.000 E0.50000 F1200", ";second", "G1 X2.000 E0.50000", ";end"]
 
 
-def test_a_path_of_which_nothing_is_written_leaves_the_speed_that_the_firmware_knows() -> None:
+def test_a_path_that_writes_no_line_does_not_change_the_current_feed() -> None:
     points: Floats = np.array([[0.0, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0], [1, 0, 0], [2, 0, 0]])
     speed = np.array([20.0, 50.0, 20.0])
     three = Paths(points, np.zeros(6), np.array([0, 2, 4, 6]), np.array([1, 1, 1], np.int8), speed, np.full(3, 1e9))

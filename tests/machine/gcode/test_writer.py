@@ -103,7 +103,7 @@ def test_rotary_words_carry_the_machine_s_letters() -> None:
 
 
 @BOTH
-def test_no_axis_is_asked_for_more_than_it_can(machine: str) -> None:
+def test_no_axis_exceeds_its_limits(machine: str) -> None:
     profile = printed(machine)[0]
     assert not [f for f in dry_run(text(machine), profile).findings if f.code in ("axis-speed", "axis-limit", "flow")]
 
@@ -122,7 +122,7 @@ def test_layers_that_ask_for_more_heat_get_it_up_to_the_machines_limit():
     assert heats[-3:] == ["M104 S210", "M104 S300", "M104 S0"]
 
 
-def test_the_heat_of_a_hotter_layer_after_a_turn_is_asked_for_before_the_turn() -> None:
+def test_the_temperature_of_a_hotter_layer_after_a_turn_is_set_before_the_turn() -> None:
     profile, _, _, program = printed()
     moves = tuple(replace(m, nozzle_add_c=5.0) if isinstance(m, BeginLayer) and m.part == 2 else m for m in moves_of(program))
     lines = list(write_gcode(program_of(program.name, moves), profile))
@@ -145,7 +145,7 @@ def test_progress_rises_to_the_end_and_its_minutes_fall() -> None:
 
 
 @BOTH
-def test_the_foot_tells_filament_and_time_as_the_dry_run_does(machine: str) -> None:
+def test_the_footer_reports_the_same_filament_and_time_as_the_dry_run(machine: str) -> None:
     profile = printed(machine)[0]
     run = dry_run(text(machine), profile)
     mm, cm3, grams = (_foot(text(machine), f"filament used [{unit}]") for unit in ("mm", "cm3", "g"))
@@ -182,20 +182,20 @@ def _with_block(name: str, block: str) -> Profile:
     return profile.model_copy(update={"machine": profile.machine.model_copy(update={"gcode": gcode})})
 
 
-def test_the_blocks_stand_around_every_turn_with_their_placeholders_filled() -> None:
+def test_the_before_part_block_precedes_a_turn_with_its_placeholders_filled() -> None:
     profile = _with_block("before_part", "M117 part {part} of {parts} at {tilt}{tilt_deg} {turn}{turn_deg} from Z{z_mm}")
     lines = list(write_gcode(printed()[3], profile))
     turn = next(k for k, line in enumerate(lines) if line.startswith("G0 A90"))
     assert re.fullmatch(r"M117 part 2 of 2 at A90 C-?90 from Z[0-9.]+", lines[turn - 1])
 
 
-def test_the_block_after_a_part_stands_behind_each_part_and_nowhere_else() -> None:
+def test_the_after_part_block_follows_each_part_and_appears_nowhere_else() -> None:
     lines = list(write_gcode(printed()[3], _with_block("after_part", "M117 done")))
     places = [line for line in lines if line == "M117 done" or line.startswith((";PART:", ";PAUSE:"))]
     assert places == [";PART:1 of 2", "M117 done", ";PART:2 of 2", "M117 done"]
 
 
-def test_the_block_before_a_layer_stands_before_every_layer_with_its_number_and_height() -> None:
+def test_the_before_layer_block_precedes_every_layer_with_its_number_and_height() -> None:
     sliced = [layer for part in printed()[2] for layer in part.layers]
     lines = list(write_gcode(printed()[3], _with_block("before_layer", "M117 {layer_num} at {layer_z} of {max_layer_z}")))
     shown = [line for line in lines if line.startswith("M117 ")]
@@ -205,7 +205,7 @@ def test_the_block_before_a_layer_stands_before_every_layer_with_its_number_and_
 
 
 @pytest.mark.parametrize("line", ["G1 Z10", "G28 X", "G91", "M82", "TIMELAPSE_TAKE_FRAME", "M84"])
-def test_what_may_move_over_the_print_or_change_a_mode_is_refused_before_a_layer(line: str) -> None:
+def test_a_before_layer_block_that_may_move_an_axis_or_change_a_mode_is_refused(line: str) -> None:
     with pytest.raises(ProfileError, match=f"machine.gcode.before_layer: '{line}' may move an axis or change a mode"):
         write_gcode(printed()[3], _with_block("before_layer", f"M104 S210\n{line}"))
 

@@ -138,7 +138,7 @@ def test_a_level_table_keeps_the_turn_it_has(turn_deg: float) -> None:
     assert poses(load().machine, UP, turn_deg) == [Pose(0.0, turn_deg)]
 
 
-def test_both_branches_are_found() -> None:
+def test_both_pose_branches_are_found() -> None:
     reached = poses(load().machine, unit([0.0, 1.0, 1.0]))
     assert [round(pose.tilt_deg, 9) for pose in reached] == [45.0, -45.0]
     assert [round(pose.turn_deg, 9) % 360.0 for pose in reached] == [0.0, 180.0]

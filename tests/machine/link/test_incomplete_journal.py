@@ -45,7 +45,7 @@ def readable(path: Path) -> JournalContents | None:
     times=st.sampled_from([1, 2, 3, 1e9]),
     syncs=st.sets(st.integers(1, 6)),
 )
-def test_whatever_fails_whenever_a_journal_that_can_be_read_tells_what_was_recorded_last(
+def test_after_any_failure_a_readable_journal_holds_the_last_record(
     tmp_path_factory: pytest.TempPathFactory, after: int, number: int, times: float, syncs: set[int]
 ) -> None:
     path = tmp_path_factory.mktemp("failing") / "j"
@@ -74,7 +74,7 @@ def test_a_disk_that_fills_up_loses_no_record(tmp_path: Path) -> None:
         assert (journal.settle(), read_journal(path).last) == ("", at(5000))
 
 
-def test_a_journal_that_a_full_disk_has_no_room_for_is_not_begun(tmp_path: Path) -> None:
+def test_a_journal_that_does_not_fit_on_a_full_disk_is_not_created(tmp_path: Path) -> None:
     first = tmp_path / "disk" / "first"
     with small_disk(tmp_path / "disk") as mount:
         first.write_bytes(b"")
@@ -83,7 +83,7 @@ def test_a_journal_that_a_full_disk_has_no_room_for_is_not_begun(tmp_path: Path)
         assert not first.with_name("j").exists()
 
 
-def test_a_journal_that_is_deleted_or_replaced_while_it_is_written_is_refused_wherever_it_lies(tmp_path: Path) -> None:
+def test_a_journal_deleted_or_replaced_during_writing_is_refused_at_any_path(tmp_path: Path) -> None:
     for act in (Path.unlink, lambda path: path.rename(tmp_path / "moved"), lambda path: shutil.copy(path, tmp_path / "copy")):
         with Journal(tmp_path / "j", HEADING) as journal:
             journal.write(at(16))
@@ -94,7 +94,7 @@ def test_a_journal_that_is_deleted_or_replaced_while_it_is_written_is_refused_wh
         assert all(readable(file) is None for file in (tmp_path / "j", tmp_path / "moved"))
 
 
-def test_a_stick_that_is_removed_is_told_and_its_journal_refused_when_it_is_back(tmp_path: Path) -> None:
+def test_a_removed_usb_drive_is_reported_and_its_journal_refused_when_it_is_back(tmp_path: Path) -> None:
     stick, drawer = tmp_path / "stick", tmp_path / "drawer"
     stick.mkdir()
     with Journal(stick / "j", HEADING) as journal, pytest.MonkeyPatch.context() as monkeypatch:
@@ -109,7 +109,7 @@ def test_a_stick_that_is_removed_is_told_and_its_journal_refused_when_it_is_back
             read_journal(journal.path)
 
 
-def test_a_disk_that_is_unmounted_under_its_print_is_told(tmp_path: Path) -> None:
+def test_a_disk_unmounted_during_a_print_is_reported(tmp_path: Path) -> None:
     with small_disk(tmp_path / "disk") as mount, Journal(tmp_path / "disk" / "j", HEADING) as journal:
         if mount("-o", "remount,rw"):
             subprocess.run(["umount", "-l", str(tmp_path / "disk")], check=True)
@@ -142,7 +142,7 @@ def test_a_failing_disk_is_noticed_by_itself_and_at_once(tmp_path: Path, monkeyp
         assert journal.trouble
 
 
-def test_a_mark_that_can_be_placed_nowhere_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_mark_that_cannot_be_saved_anywhere_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "a file").write_text("")
     monkeypatch.setattr(journals, "state_folders", lambda: (tmp_path / "a file" / "state",))
     monkeypatch.setattr(journals, "MEMORY", tmp_path / "a file")

@@ -35,7 +35,7 @@ def written(path: Path, moments: list[Checkpoint]) -> Path:
     return path
 
 
-def test_what_was_marked_is_read_back(tmp_path: Path) -> None:
+def test_a_recorded_mark_is_read_back(tmp_path: Path) -> None:
     story = read_journal(written(tmp_path / "j", [at(16), at(32)]))
     assert (story.heading, story.last, story.torn, story.finished) == (HEADING, at(32), 0, False)
 
@@ -90,7 +90,7 @@ def test_a_torn_record_is_damage_where_the_computer_has_not_restarted(tmp_path: 
     assert read_journal(path).torn == 1
 
 
-def test_a_journal_tells_whether_its_computer_has_restarted_since(tmp_path: Path, restarted: Callable[[], None]) -> None:
+def test_a_journal_reports_whether_its_computer_has_restarted(tmp_path: Path, restarted: Callable[[], None]) -> None:
     path = written(tmp_path / "j", [at(16)])
     assert read_journal(path).computer_ran_on
     restarted()
@@ -122,7 +122,7 @@ def test_a_journal_never_grows(tmp_path: Path) -> None:
     (b'%08x {"format":3}\n' % crc32(b'{"format":3}'), "lacks the program or the profile"),
     (os.urandom(5000), "is not the journal"),
 ])  # fmt: skip
-def test_what_is_no_journal_is_refused_with_a_sentence(tmp_path: Path, content: bytes, words: str) -> None:
+def test_an_invalid_journal_is_refused_with_a_message(tmp_path: Path, content: bytes, words: str) -> None:
     (tmp_path / "j").write_bytes(content)
     with pytest.raises(JournalError, match=words):
         read_journal(tmp_path / "j")
@@ -173,7 +173,7 @@ def test_a_record_in_a_hurry_is_on_the_disk_before_its_second_is_over(tmp_path: 
         assert read_journal(tmp_path / "j").last == at(16)
 
 
-def test_nothing_new_is_not_noted(tmp_path: Path) -> None:
+def test_an_unchanged_position_is_not_recorded_again(tmp_path: Path) -> None:
     with Journal(tmp_path / "j", HEADING) as journal:
         for second in range(100):
             journal.update(at(3), float(second))
@@ -181,7 +181,7 @@ def test_nothing_new_is_not_noted(tmp_path: Path) -> None:
 
 
 @given(records=st.integers(0, 7))
-def test_a_resumed_journal_names_the_one_that_goes_on(tmp_path_factory: pytest.TempPathFactory, records: int) -> None:
+def test_a_resumed_journal_names_its_continuation(tmp_path_factory: pytest.TempPathFactory, records: int) -> None:
     path = written(tmp_path_factory.mktemp("resumed") / "j", [at(16 * k) for k in range(1, records + 1)])
     before = read_journal(path)
     mark_resumed(path, before, Path("rest"))
@@ -235,7 +235,7 @@ def test_a_path_too_long_for_a_record_is_refused(tmp_path: Path) -> None:
     assert read_journal(path).last == at(16)
 
 
-def test_the_program_of_a_model_is_kept_beside_its_journal(tmp_path: Path) -> None:
+def test_the_program_of_a_model_is_saved_next_to_its_journal(tmp_path: Path) -> None:
     with new_journal(["G28", "G1 X5"], load(), "demo:figure", None, tmp_path / "j") as journal:
         pass
     heading = read_journal(journal.path).heading
@@ -245,7 +245,7 @@ def test_the_program_of_a_model_is_kept_beside_its_journal(tmp_path: Path) -> No
     assert [oct(file.stat().st_mode & 0o777) for file in (journal.path, tmp_path / "j.gcode")] == ["0o600"] * 2
 
 
-def test_a_journal_that_cannot_be_kept_is_one_sentence(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+def test_a_journal_that_cannot_be_written_gives_a_one_line_error(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     (tmp_path / "tiltprint").mkdir()
     (tmp_path / "tiltprint" / "journals").write_text("a file", encoding="utf-8")
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))

@@ -34,7 +34,7 @@ def test_acknowledged_moves_are_executed_as_far_as_the_planner_has_room() -> Non
 @given(
     st.lists(st.tuples(st.integers(0, 15), st.sampled_from([0.0, 0.03, -0.03, 0.08, -0.08, 0.2, 2.0])), min_size=1, max_size=60)
 )
-def test_what_counts_as_executed_never_holds_a_move_that_waits(steps: list[tuple[int, float]]) -> None:
+def test_executed_lines_never_include_a_waiting_move(steps: list[tuple[int, float]]) -> None:
     """The simulated planner holds at most 15 blocks, the oldest leave until the required places are free, and a move of fewer
     than 6 of 80 steps per mm is dropped and added to the next one, as in Marlin (MIN_STEPS_PER_SEGMENT).
     """
@@ -54,7 +54,7 @@ def test_what_counts_as_executed_never_holds_a_move_that_waits(steps: list[tuple
         assert history.executed < min(waiting, default=line + 1)
 
 
-def test_moves_too_short_for_a_place_of_their_own_wait_together() -> None:
+def test_moves_too_short_for_their_own_planner_block_wait_together() -> None:
     history = LineHistory(waiting=15)
     for step in moves(160, step_mm=0.04):
         history.send(step)
@@ -94,7 +94,7 @@ def test_a_damaged_number_of_free_places_moves_nothing_on() -> None:
     assert history.executed < 40 - 10
 
 
-def test_without_word_of_the_planner_only_a_barrier_tells() -> None:
+def test_without_planner_reports_only_a_barrier_confirms_execution() -> None:
     history = LineHistory()
     for step in moves(40):
         history.send(step)
@@ -104,7 +104,7 @@ def test_without_word_of_the_planner_only_a_barrier_tells() -> None:
     assert history.executed == 40
 
 
-def test_a_firmware_bounds_what_waits_where_its_answers_do_not_tell() -> None:
+def test_without_planner_reports_the_firmware_s_queue_limits_the_waiting_moves() -> None:
     history = LineHistory(waiting=20)
     for step in moves(40):
         history.send(step)
@@ -126,7 +126,7 @@ def test_the_history_of_a_mute_printer_stays_small() -> None:
     ("MANUAL_STEPPER STEPPER=a MOVE=5", True),
     ("G1 X5 Z5 E1", False), ("G0 X5 Y5", False), ("M104 S200", False), ("G28 Z", False),
 ])  # fmt: skip
-def test_what_moves_the_tip_up_or_turns_the_table_without_filament_shifts(command: str, shifted: bool) -> None:
+def test_a_z_move_or_table_turn_without_filament_is_a_shift(command: str, shifted: bool) -> None:
     assert shifts(command, ("X", "Y", "Z", "A", "C", "E")) is shifted
 
 
@@ -143,7 +143,7 @@ def test_a_lifted_travel_begins_when_all_moves_are_over_and_a_mute_printer_is_wa
 
 
 @pytest.mark.parametrize(("tracked", "after_s", "command"), [(True, CHECK_S, "G1 X5 E1"), (False, CHECK_MUTE_S, "G0 X5")])
-def test_the_position_is_looked_at_now_and_then(tracked: bool, after_s: float, command: str) -> None:
+def test_the_position_is_checked_periodically(tracked: bool, after_s: float, command: str) -> None:
     barriers, looked = Barriers(LETTERS, 0.0), []
     for second in range(100):
         barriers.layer_ended = True

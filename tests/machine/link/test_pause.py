@@ -119,12 +119,12 @@ def filament_before_pause(lines: list[str]) -> float:
     return sum(float(m[1]) for line in lines[: lines.index("M400")] if (m := re.search(r" E(\S+)$", line)))
 
 
-def test_the_states_of_a_pause_are_told_in_order(paused: Watcher) -> None:
+def test_the_states_of_a_pause_are_reported_in_order(paused: Watcher) -> None:
     states = list(dict.fromkeys(progress.state for progress in paused.shown))
     assert states == ["printing", "pausing", "paused", "resuming", "finishing"]
 
 
-def test_a_pause_is_shown_at_once_though_it_begins_after_the_stroke_under_way(paused: Watcher) -> None:
+def test_a_pause_is_shown_at_once_although_it_starts_after_the_current_stroke(paused: Watcher) -> None:
     asked = next(index for index, progress in enumerate(paused.shown) if progress.acknowledged >= 150)
     assert [progress.state for progress in paused.shown[asked : asked + 2]] == ["printing", "pausing"]
 
@@ -139,7 +139,7 @@ def test_a_pause_that_is_wanted_while_the_printer_heats_says_that_it_begins_once
     assert paused.message == ""
 
 
-def test_a_pause_that_is_wanted_before_the_nozzle_is_hot_waits_for_it_so_that_no_filament_is_pulled_cold() -> None:
+def test_a_pause_requested_while_the_nozzle_heats_waits_so_that_no_filament_is_retracted_cold() -> None:
     watcher = watched({5: Command.PAUSE, "paused": Command.RESUME})  # line 5 sets the nozzle and does not wait
     assert not watcher.run(PROGRAM).cancelled
     (paused, *_) = [progress for progress in watcher.shown if progress.state == "paused"]
@@ -169,7 +169,7 @@ def test_an_emergency_stop_that_halts_the_printer_shows_heaters_without_targets(
     assert (after.nozzle_target_c, after.bed_target_c) == (0.0, 0.0)
 
 
-def test_the_targets_of_a_cancelled_print_are_off_as_soon_as_the_printer_has_said_so() -> None:
+def test_the_targets_of_a_cancelled_print_are_off_once_the_printer_confirms_it() -> None:
     watcher = watched({150: Command.CANCEL})
     assert watcher.run(PROGRAM).heaters_off
     before, after = (progress.temperature for progress in (watcher.shown[-2], watcher.shown[-1]))
@@ -177,7 +177,7 @@ def test_the_targets_of_a_cancelled_print_are_off_as_soon_as_the_printer_has_sai
     assert (after.nozzle_target_c, after.bed_target_c) == (0.0, 0.0)
 
 
-def test_a_pause_begins_after_the_stroke_under_way_and_lifts_before_it_goes_aside(paused: Watcher) -> None:
+def test_a_pause_starts_after_the_current_stroke_and_lifts_before_it_moves_aside(paused: Watcher) -> None:
     lines = paused.lines()
     stop = lines.index("M400")
     assert " E" in lines[stop - 1]
@@ -240,7 +240,7 @@ def test_a_cancel_while_the_tip_is_parked_leaves_it_there() -> None:
     assert "G91" not in watcher.lines()
 
 
-def test_the_emergency_stop_is_the_next_thing_on_the_wire_and_no_line_follows() -> None:
+def test_the_emergency_stop_is_sent_next_and_no_line_follows() -> None:
     watcher = watched({150: Command.EMERGENCY_STOP})
     written: list[bytes] = []
     known = "nozzle 200 °C, bed 60 °C as last known, [0-5] s before"
@@ -280,7 +280,7 @@ def _written(medium: Medium, written: list[bytes], deaf: bytes = b"") -> Medium:
 @pytest.mark.parametrize(("wish", "value", "sent", "undone"), [
     (Command.FEED, 150.0, "M220 S150", "M220 S100"), (Command.FLOW, 95.0, "M221 S95", "M221 S100"),
 ])  # fmt: skip
-def test_overrides_are_sent_told_and_taken_back_at_the_end(wish: Command, value: float, sent: str, undone: str) -> None:
+def test_overrides_are_sent_reported_and_undone_at_the_end(wish: Command, value: float, sent: str, undone: str) -> None:
     watcher = watched({100: (wish, value)})
     watcher.run(PROGRAM)
     lines, last = watcher.lines(), watcher.shown[-1]
@@ -309,7 +309,7 @@ def test_a_line_that_would_spoil_the_print_is_not_sent(text: str) -> None:
     assert is_exact(watcher)
 
 
-def test_a_harmless_line_goes_out_between_those_of_the_program() -> None:
+def test_a_harmless_user_line_is_sent_between_program_lines() -> None:
     watcher = watched({100: (Command.LINE, 100.0, "M117 half way ; a note")})
     watcher.run(PROGRAM)
     assert "M117 half way" in watcher.lines()
@@ -331,7 +331,7 @@ def test_filament_may_be_changed_in_a_pause_and_the_count_is_restored() -> None:
     assert is_exact(watcher)
 
 
-def test_a_temperature_of_ones_own_holds_beyond_a_pause() -> None:
+def test_a_temperature_set_by_the_user_is_kept_after_a_pause() -> None:
     watcher = watched({100: (Command.LINE, 100.0, "M104 S215"), 150: Command.PAUSE, "paused": Command.RESUME})
     watcher.run(PROGRAM)
     assert "M109 S215" in watcher.lines()
@@ -350,7 +350,7 @@ def test_a_port_that_comes_back_to_a_printer_that_went_on_loses_and_doubles_noth
 
 @pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
 @pytest.mark.parametrize("line", [14, 30, 61])
-def test_a_firmware_that_never_asks_for_a_line_again_goes_on_by_its_place(dialect: str, line: int) -> None:
+def test_a_firmware_that_never_requests_resends_continues_from_its_last_position(dialect: str, line: int) -> None:
     watcher = watched({}, Fault("disconnect", at=line, unit="line", seconds=2.0), profile=UNASKING[dialect])
     assert not watcher.run(PROGRAM).cancelled
     assert is_exact(watcher)
@@ -380,7 +380,7 @@ def test_a_firmware_that_restarted_behind_the_lost_port_is_seen_by_its_place(dia
 
 
 @pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
-def test_a_cancel_while_a_printer_that_is_there_again_is_asked_for_its_place_switches_its_heaters_off(dialect: str) -> None:
+def test_a_cancel_during_the_query_after_a_reconnection_switches_the_heaters_off(dialect: str) -> None:
     watcher = watched({}, Fault("disconnect", at=30, unit="line", seconds=2.0), profile=UNASKING[dialect])
     note = watcher.traffic
 
@@ -453,7 +453,7 @@ def test_the_stop_flag_ends_the_wait_for_a_lost_port() -> None:
     assert (outcome.cancelled, outcome.heaters_off) == (True, False)
 
 
-def test_a_program_that_waits_for_a_person_is_paused_by_the_sender_itself() -> None:
+def test_a_program_that_waits_for_the_user_is_paused_by_the_sender_itself() -> None:
     plain, paused = watched(), watched({"paused": Command.RESUME})
     plain.run(PROGRAM)
     middle = len(START) + len(POSED) + 200

@@ -121,7 +121,7 @@ def test_an_address_without_host_and_port_says_how_one_is_written(address: str) 
     ("rfc2217://localhost:1", "connection refused"),
     ("socket://no-such-host.invalid:5000", "no such host"),
 ])  # fmt: skip
-def test_a_network_port_where_nobody_listens_gives_one_sentence(address: str, words: str) -> None:
+def test_a_network_port_without_a_listener_gives_a_one_line_error(address: str, words: str) -> None:
     with pytest.raises(PortError, match=rf"^port {address} cannot be opened: .*{words}$"):
         open_port(address, 115200)
 
@@ -138,7 +138,7 @@ def test_a_connection_closed_by_the_other_end_is_lost() -> None:
             port.read()
 
 
-def test_a_server_of_rfc_2217_that_goes_away_is_a_lost_connection() -> None:
+def test_a_disconnected_rfc_2217_server_is_a_lost_connection() -> None:
     master, slave = pty.openpty()
     with behind_rfc2217(os.ttyname(slave)) as address, open_port(address, 115200) as port:
         os.close(master)
@@ -201,7 +201,7 @@ def test_a_closed_port_touches_no_file_that_has_its_descriptor_since(tmp_path: P
         assert file.read_bytes() == b"text"
 
 
-def test_serial_devices_are_told_once_and_stable_names_first(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_serial_devices_are_listed_once_with_stable_names_first(monkeypatch: pytest.MonkeyPatch) -> None:
     class Found:
         def __init__(self, device: str, product: str | None, number: str | None) -> None:
             self.device, self.product, self.serial_number = device, product, number
@@ -240,7 +240,7 @@ HOME = adapter("/dev/ttyACM0")
     (adapter("COM3", "", ""), [adapter("COM4", "", "")], None),  # neither number nor socket: only the name is known
     (adapter("COM3", "", ""), [adapter("COM3", "", "")], "COM3"),
 ])  # fmt: skip
-def test_a_lost_adapter_is_found_by_its_serial_number_or_its_socket_and_no_other_is_taken_for_it(
+def test_a_lost_adapter_is_identified_by_its_serial_number_or_socket_and_never_confused(
     lost: SerialDevice, there: list[SerialDevice], found: str | None
 ) -> None:
     device = find_again(lost, there)
@@ -254,7 +254,7 @@ def test_a_device_is_known_by_its_path_and_by_its_stable_name() -> None:
     assert find_device("socket://printer:23", [stable]) is None
 
 
-def test_a_printer_that_comes_back_under_another_name_prints_on_and_its_new_port_is_told() -> None:
+def test_a_printer_that_returns_under_another_name_continues_and_its_new_port_is_reported() -> None:
     printer = VirtualPrinter(MACHINE, faults=FaultScript((Fault("disconnect", 30, unit="line", seconds=2.0),)))
     opened, messages = list[str](), list[str]()
 

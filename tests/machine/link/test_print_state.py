@@ -24,7 +24,7 @@ def test_every_state_has_a_row_and_can_be_reached_from_the_first() -> None:
 
 
 @pytest.mark.parametrize("state", sorted(PrintState))
-def test_a_print_can_end_in_every_way_whatever_it_is_at_and_stays_over(state: PrintState) -> None:
+def test_a_print_can_end_from_every_state_and_stays_over(state: PrintState) -> None:
     """States that follow each other quickly are merged into one report, so any end may follow the first state."""
     assert follows(state, state)
     if state not in OVER:
@@ -33,7 +33,7 @@ def test_a_print_can_end_in_every_way_whatever_it_is_at_and_stays_over(state: Pr
         assert TABLE[state] == ({PrintState.CANCELLING} if state is PrintState.LEFT else set())
 
 
-def test_a_moment_is_told_to_a_page_as_it_is() -> None:
+def test_a_status_is_sent_to_a_page_unchanged() -> None:
     status = PrintStatus(PrintState.PAUSED, 2.0, Temperature(210.0, 215.0), file_line=7, at={"X": 1.0}, heat_age_s=20.0)
     page = json.loads(json.dumps(status.json()))
     assert (page["state"], page["file_line"], page["at"], page["nozzle_c"]) == ("paused", 7, {"X": 1.0}, 210.0)

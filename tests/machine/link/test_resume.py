@@ -143,7 +143,7 @@ def test_after_the_host_has_died_the_rest_follows_without_gap_or_overlap(
     assert np.array_equal(moved(printer), whole)
 
 
-def test_a_print_that_had_hardly_begun_begins_anew(text: GcodeFile, whole: np.ndarray) -> None:
+def test_a_print_that_had_hardly_started_restarts_from_the_first_line(text: GcodeFile, whole: np.ndarray) -> None:
     printer = VirtualPrinter(PROFILE.machine)
     way, _ = resumed(text, printer, killed(text, printer, 9))
     assert (way.line, way.before) == (1, ())
@@ -189,7 +189,7 @@ def test_the_turns_of_the_table_are_not_forgotten(text: GcodeFile) -> None:
     assert any(line.startswith("G92 X") and line.endswith("A30 C725") for line in way.before)
 
 
-def test_a_parked_printer_whose_host_has_died_comes_back_without_homing(text: GcodeFile, whole: np.ndarray) -> None:
+def test_a_parked_printer_resumes_without_homing_after_its_host_has_died(text: GcodeFile, whole: np.ndarray) -> None:
     printer = VirtualPrinter(PROFILE.machine)
     story = killed(text, printer, 233)
     line = printer.medium.open(PATH, 0)
@@ -239,7 +239,7 @@ def heights_of_strokes(printer: VirtualPrinter) -> set[float]:
     return set(np.round(record.end[rows & (record.end[:, 0] != record.start[:, 0]), 2], 3).tolist())
 
 
-def test_a_print_whose_host_has_died_keeps_its_z_offset_and_takes_it_back(text: GcodeFile) -> None:
+def test_a_print_resumed_after_a_host_crash_keeps_its_z_offset_and_undoes_it_at_the_end(text: GcodeFile) -> None:
     printer = VirtualPrinter(PROFILE.machine)
     story = shifted_then_killed(text, printer)
     way, sent = resumed(text, printer, story)
@@ -263,7 +263,7 @@ def test_after_a_power_cut_the_axis_keeps_the_z_offset_which_marlin_does_not_set
     assert heights_of_strokes(printer) == {63.1, 63.3}
 
 
-def test_after_such_a_restart_a_further_z_offset_is_refused_as_marlin_would_ignore_it(text: GcodeFile) -> None:
+def test_after_a_power_cut_a_further_z_offset_is_refused_because_marlin_would_ignore_it(text: GcodeFile) -> None:
     printer, control, messages = VirtualPrinter(PROFILE.machine), Control(), list[str]()
     story = shifted_then_killed(text, printer)
     printer.firmware.reset()
@@ -281,7 +281,7 @@ def test_after_such_a_restart_a_further_z_offset_is_refused_as_marlin_would_igno
     assert heights_of_strokes(printer) == {63.1, 63.3}
 
 
-def test_a_host_that_dies_after_such_a_restart_still_knows_that_marlin_ignores_a_z_offset(text: GcodeFile) -> None:
+def test_a_host_crash_after_a_power_cut_still_records_that_marlin_ignores_a_z_offset(text: GcodeFile) -> None:
     printer = VirtualPrinter(PROFILE.machine)
     story = shifted_then_killed(text, printer)
     printer.firmware.reset()
@@ -305,7 +305,7 @@ def test_a_resume_block_homes_z_by_g28_alone_or_with_that_letter(block: str, hom
     assert homes_z(PROFILE.machine.model_copy(update={"gcode": gcode})) is homes
 
 
-def test_a_print_that_begins_anew_says_that_its_z_offset_is_lost() -> None:
+def test_a_restarted_print_reports_that_its_z_offset_is_lost() -> None:
     way = plan_resume(replace(point(12), checkpoint=Checkpoint(12, 12, 12, 100, z_offset_mm=-0.05)), asked(), PROFILE)
     assert (way.line, way.z_offset_mm) == (1, 0.0)
     assert way.reason.endswith("set its Z offset of -0.05 mm again")
@@ -378,12 +378,12 @@ def seconds_of_a_print(text: GcodeFile, journal: str, wrap: Callable[[Wire], Wir
     return printer.now_s
 
 
-def test_a_printer_whose_reports_stand_still_is_waited_for_once(text: GcodeFile) -> None:
+def test_a_printer_with_frozen_reports_is_waited_for_once(text: GcodeFile) -> None:
     usual_s = seconds_of_a_print(text, "usual", lambda wire: wire)
     assert seconds_of_a_print(text, "frozen", _Frozen) - usual_s < 10.0
 
 
-def test_a_simulated_printer_as_fast_as_it_goes_is_not_asked_how_many_moves_wait(text: GcodeFile) -> None:
+def test_a_simulated_printer_at_full_speed_is_not_queried_for_waiting_moves(text: GcodeFile) -> None:
     sent: list[bytes] = []
     with SimulatedPrinter(PROFILE.machine) as printer, journal_of(text, "fast") as journal:
         medium = tap(lambda way, data: sent.append(data) if way == ">" else None)
@@ -413,7 +413,7 @@ def test_a_height_in_doubt_is_not_guessed(text: GcodeFile, tmp_path: Path, capsy
 
 
 @pytest.mark.parametrize(("said", "called"), [("2", "Z62.2 "), ("n", "")])
-def test_the_height_that_a_person_sees_is_what_the_axis_is_called(
+def test_the_height_confirmed_by_the_user_is_set_as_the_axis_position(
     text: GcodeFile, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, said: str, called: str
 ) -> None:
     monkeypatch.setattr("sys.stdin", Person([said, "y"]))
@@ -459,7 +459,7 @@ def test_the_point_knows_part_layer_pose_and_modes() -> None:
     assert at.stroked
 
 
-def test_a_printer_that_stands_at_several_lines_ends_is_taken_at_the_first() -> None:
+def test_a_position_that_matches_the_ends_of_several_lines_resumes_at_the_first() -> None:
     still = [*START, "G0 X10 Y20 Z30", "G1 X11 E1 F600", "M106 S10", "M106 S20", "M106 S30", "G1 X12 E1"]
     at = cut_off(still, Checkpoint(13, 13, 13, 5))
     way = plan_resume(at, asked({"X": 11.0, "Y": 20.0, "Z": 30.0, "E": 1.0}), PROFILE)
@@ -467,13 +467,13 @@ def test_a_printer_that_stands_at_several_lines_ends_is_taken_at_the_first() -> 
 
 
 @pytest.mark.parametrize("state", [PrintState.PAUSED, PrintState.CANCELLED])
-def test_a_tip_that_was_taken_away_is_told_where_it_was_taken(state: str) -> None:
+def test_the_position_of_a_parked_tip_is_set_to_where_it_was_moved(state: str) -> None:
     moment = Checkpoint(LINE + 3, LINE, LINE, 100, (159.0, -159.0, 120.0, 30.0, 725.0, 5.0), state)
     before = plan_resume(cut_off(PROGRAM, moment), asked(), PROFILE).before
     assert "G92 X159 Y-159 Z120 A30 C725" in before
 
 
-def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text: GcodeFile) -> None:
+def test_the_journal_of_a_cancelled_print_records_where_the_tip_was_lifted_to(text: GcodeFile) -> None:
     printer, stop = VirtualPrinter(PROFILE.machine), Flag()
 
     def see(progress: PrintStatus) -> None:
@@ -487,7 +487,7 @@ def test_the_journal_of_a_cancelled_print_tells_where_the_tip_was_lifted_to(text
     assert last.pose[:5] == pytest.approx(tuple(printer.record.end[-1, :5]), abs=0.005)
 
 
-def test_a_profiles_own_block_homes_instead() -> None:
+def test_a_profile_s_resume_block_homes_instead() -> None:
     block = "G28 Z\nG28 X Y\nHOME_AC\nG0 Z{clear_z_mm}\nG0 {tilt}{tilt_deg} {turn}{turn_deg}"
     profile = load(settings=[f"machine.gcode.resume={block!r}"])
     before = plan_resume(point(LINE), asked(), with_block(profile, block)).before
@@ -527,19 +527,19 @@ MOVED = {"X": 50.0, "Y": 50.0, "Z": 50.0}
     (cut_off(NOWHERE, Checkpoint(14, 14, 13, 5)), asked(), PROFILE, "where X Y Z stand is unknown"),
     (point(LINE), asked(), FOLLOWING, "follows the table by itself"),
 ])  # fmt: skip
-def test_where_going_on_would_be_a_guess_it_is_refused(
+def test_a_resume_that_would_be_a_guess_is_refused(
     at: InterruptedPrint, said: PrinterStatus, profile: Profile, sentence: str
 ) -> None:
     with pytest.raises(JournalError, match=sentence):
         plan_resume(at, said, profile)
 
 
-def test_a_printer_whose_greeting_was_heard_has_restarted_wherever_it_believes_to_stand() -> None:
+def test_a_printer_that_sent_its_greeting_has_restarted_whatever_position_it_reports() -> None:
     greeted = replace(asked(MOVED), greeted=True)
     assert plan_resume(point(LINE), greeted, PROFILE).homes
 
 
-def test_home_positions_of_the_profile_tell_where_a_restarted_firmware_believes_to_stand() -> None:
+def test_the_profile_s_home_positions_identify_a_restarted_firmware() -> None:
     elsewhere = asked({"X": -5.0, "Y": 330.0, "Z": 300.0, "A": 0.0, "C": 0.0})
     with pytest.raises(JournalError, match=r"write it as machine\.x\.home_mm"):
         plan_resume(point(LINE), elsewhere, PROFILE)
@@ -551,7 +551,7 @@ def test_home_positions_say_nothing_about_a_firmware_that_does_not_count_lines()
     assert not plan_resume(point(LINE), asked(AT_HOME, last=None), PROFILE).homes
 
 
-def test_a_board_that_restarts_while_it_is_asked_has_begun_its_numbers_anew() -> None:
+def test_a_board_that_restarts_during_the_query_has_reset_its_line_numbers() -> None:
     printer = VirtualPrinter(PROFILE.machine, faults=FaultScript((Fault("reset", at=2, unit="line"),)))
     line = printer.medium.open(PATH, 0)
     line.write(frame(1, "M110 N500") + b"\n")
@@ -601,7 +601,7 @@ MODES: list[tuple[str, Callable[[ModalState], object], object]] = [
 
 
 @pytest.mark.parametrize(("command", "look", "expected"), MODES)
-def test_what_a_firmware_remembers_of_a_command(command: str, look: Callable[[ModalState], object], expected: object) -> None:
+def test_the_modal_state_after_a_command(command: str, look: Callable[[ModalState], object], expected: object) -> None:
     modal = ModalState(axes_of(PROFILE.machine))
     modal.take(command)
     assert look(modal) == expected
@@ -617,7 +617,7 @@ def test_saying_all_again_leads_to_the_same_state() -> None:
 
 
 @pytest.mark.parametrize("dialect", ["open5x_voron0", "open5x_jubilee", "fractal5pro"])
-def test_every_firmware_is_told_where_its_axes_stand(dialect: str) -> None:
+def test_every_firmware_is_sent_its_axis_positions(dialect: str) -> None:
     profile = load(dialect)
     letters = (profile.machine.tilt.letter, profile.machine.turn.letter)
     x, y = (0.5 * sum(axis.limits_mm) for axis in (profile.machine.x, profile.machine.y))
@@ -687,7 +687,7 @@ def test_the_command_lists_the_prints_that_can_be_resumed_and_no_others(
     assert capsys.readouterr().err.endswith("at which port is the printer? --port PORT is expected\n")
 
 
-def test_a_missing_journal_is_reported_before_a_port_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_journal_is_reported_before_a_port_is_required(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["resume", "not-there.journal"]) == 1
     assert capsys.readouterr().err == "tiltprint: journal not-there.journal cannot be read: no such file or directory\n"
 
@@ -706,7 +706,7 @@ def test_the_command_refuses_a_journal_of_another_program(
     assert words in capsys.readouterr().err
 
 
-def test_a_cut_while_the_table_turned_is_resumed_by_a_profile_that_tells_how_it_is_homed(
+def test_a_power_cut_during_a_table_turn_is_resumed_with_a_profile_that_defines_homing(
     text: GcodeFile, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with journal_of(text, "j") as journal:
@@ -735,7 +735,7 @@ def test_a_journal_stays_whole_when_the_printer_does_not_answer(
     assert read_journal(journal.path).last.continued_in is None
 
 
-def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that_nobody_gives(
+def test_resume_refuses_a_finished_print_another_machine_and_a_missing_answer(
     text: GcodeFile, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with journal_of(text, "j") as journal:
@@ -755,7 +755,7 @@ def test_the_command_refuses_a_finished_print_another_machine_and_an_answer_that
     assert "a simulated printer ends with its print" in errors
 
 
-def test_a_cancel_is_heeded_while_the_printer_is_asked_where_it_stands(text: GcodeFile) -> None:
+def test_a_cancel_is_handled_while_the_printer_s_position_is_queried(text: GcodeFile) -> None:
     printer, stop = VirtualPrinter(PROFILE.machine), Flag()
     deaf = Medium(lambda name, baud: _Deaf(printer.medium.open(name, baud)), printer.medium.now_s, printer.medium.wait)
     stop.set()

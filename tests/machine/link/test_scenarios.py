@@ -285,7 +285,7 @@ def test_scenario_15_a_resend_beyond_history_or_in_the_future_ends_the_print_saf
     assert_cold(done)
 
 
-def test_scenario_16_the_same_line_asked_for_again_and_again() -> None:
+def test_scenario_16_the_same_line_is_requested_repeatedly() -> None:
     begin, size = byte(LINE, 9, PLAIN), byte(LINE + 1, 0, PLAIN) - byte(LINE, 0, PLAIN)
     done = printed([Fault("drop", begin + k * size) for k in range(40)], PLAIN)
     assert isinstance(done.error, PrinterError)
@@ -295,7 +295,7 @@ def test_scenario_16_the_same_line_asked_for_again_and_again() -> None:
     assert_cold(done)
 
 
-def test_scenario_17_an_error_of_the_line_without_a_resend_is_asked_about_at_once() -> None:
+def test_scenario_17_a_line_error_without_a_resend_is_queried_at_once() -> None:
     words = "Error:No Line Number with checksum, Last Line: 59\n"
     done = printed([Fault("garbage", byte(LINE, 0, PLAIN), unit="byte", text=words), *lost(LINE, PLAIN)], PLAIN)
     assert_exact(done)
@@ -454,7 +454,7 @@ def test_scenario_30_actions_of_the_printer_are_heeded() -> None:
     assert any("dance" in warning for warning in unknown.warnings)
 
 
-def test_scenario_31_an_emergency_stop_goes_ahead_of_everything() -> None:
+def test_scenario_31_an_emergency_stop_is_sent_before_everything_else() -> None:
     control, asked = Control(), []
 
     def listen(now_s: float, way: str, data: bytes) -> None:
@@ -682,7 +682,7 @@ BESIDES: dict[str, Callable[[BuildOptions], list[Fault]]] = {
 
 @BOTH
 @pytest.mark.parametrize("name", BESIDES)
-def test_what_else_noise_may_do_is_healed(build: BuildOptions, name: str) -> None:
+def test_other_noise_is_corrected(build: BuildOptions, name: str) -> None:
     done = printed(BESIDES[name](build), build)
     assert_exact(done)
     assert (done.sent, done.heard) != (clean(build).sent, clean(build).heard)

@@ -95,13 +95,13 @@ def test_a_printer_that_falls_silent_in_homing_is_not_waited_for_twice() -> None
     assert printer.medium.now_s() - silent_s[-1] < 15.0
 
 
-def test_a_printer_that_halts_while_it_is_cancelled_says_so() -> None:
+def test_a_printer_that_halts_during_a_cancel_is_reported() -> None:
     printer = VirtualPrinter(SLOW.machine, faults=FaultScript((Fault("thermal runaway", at=9, unit="line"),)))
     outcome = cancelled_in_homing(printer)
     assert (outcome.heaters_off, outcome.halted[:20]) == (True, "switch it off and on")
 
 
-def test_a_printer_that_has_stopped_for_good_is_told_from_one_that_may_still_heat() -> None:
+def test_a_halted_printer_is_distinguished_from_one_that_may_still_heat() -> None:
     printer = VirtualPrinter(SLOW.machine, faults=FaultScript((Fault("thermal runaway", at=5, unit="line"),)))
     with pytest.raises(FirmwareError, match="has halted and switched its heaters off by itself: switch it off and on"):
         print_lines(HOMING, PATH, medium=printer.medium, profile=SLOW)
@@ -123,7 +123,7 @@ def test_an_emergency_stop_of_a_klipper_is_confirmed() -> None:
     assert emergency_stop(printer.medium.open(PATH, 0), printer.medium)  # once more: it now answers M112 with a bare ok
 
 
-def test_a_firmware_that_insists_on_checksums_prints_and_is_switched_off_and_asked() -> None:
+def test_a_firmware_that_requires_checksums_can_be_printed_on_switched_off_and_queried() -> None:
     printer = VirtualPrinter(SLOW.machine, INSISTS)
     assert print_lines(HOMING, PATH, medium=printer.medium, profile=SLOW).acknowledged == len(HOMING)
     wire = printer.medium.open(PATH, 0)
@@ -208,12 +208,12 @@ class Old(Wire):
     ((b"Error:Printer halted. kill() called!\n", b"T:20.0 /0.0"), Heaters.HALTED),
     ((b"", b"T:20.0 /0.0 B:20.0 /0.0\n"), Heaters.OFF),
 ], ids=["whole", "torn", "halted", "after the orders"])  # fmt: skip
-def test_what_was_said_before_the_orders_proves_nothing_but_a_halt(old: tuple[bytes, ...], known: Heaters) -> None:
+def test_output_from_before_the_commands_proves_nothing_except_a_halt(old: tuple[bytes, ...], known: Heaters) -> None:
     wire = Old(*old)
     assert heaters_off(wire, Medium(lambda name, baud: wire, lambda: wire.now_s, lambda seconds: None)) is known
 
 
-def test_a_firmware_that_answers_every_question_with_missing_checksum_is_asked_with_one() -> None:
+def test_a_firmware_that_answers_missing_checksum_is_queried_with_one() -> None:
     with SimulatedPrinter(SLOW.machine, build=INSISTS) as printer, open_port(printer.path, 115200) as port:
         answer = ask(port)
     assert (answer.kind, answer.letters) == (Kind.PRINTER, "XYZAC")
@@ -229,11 +229,11 @@ class Always(Wire):
         return self._said
 
 
-def test_what_refuses_every_line_for_its_checksum_is_a_printer() -> None:
+def test_a_device_that_refuses_every_line_without_checksum_is_a_printer() -> None:
     assert ask(Always(b"Error: Missing checksum\n"), 0.1).kind is Kind.PRINTER  # type: ignore[arg-type]
 
 
-def test_a_port_is_asked_nothing_once_the_asking_is_stopped() -> None:
+def test_a_port_is_sent_nothing_once_the_query_is_stopped() -> None:
     class Silent:
         name, written = "/dev/silent", b""
 
@@ -252,7 +252,7 @@ def test_a_port_is_asked_nothing_once_the_asking_is_stopped() -> None:
     assert port.written == b""
 
 
-def test_an_error_whose_second_line_never_comes_is_heard_all_the_same() -> None:
+def test_an_error_without_its_second_line_is_still_read() -> None:
     wire = Wire(b"Error:0\n")
     orders = Orders(wire, Medium(lambda name, baud: wire, lambda: wire.now_s, lambda seconds: None))
     assert orders.wait_for(lambda event: event.text == "Error:0", 1.0)

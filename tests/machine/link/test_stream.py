@@ -89,7 +89,7 @@ def test_the_end_of_a_print_is_the_end_of_its_moves() -> None:
         assert record.begin_s[-1] + record.duration_s[-1] <= printer._firmware.board.now_s
 
 
-def test_progress_tells_counts_temperatures_part_layer_and_time_left() -> None:
+def test_progress_reports_counts_temperatures_part_layer_and_time_left() -> None:
     shown: list[PrintStatus] = []
     body = [";PART:1 of 2", ";LAYER_CHANGE", "G1 X1", ";PART:2 of 2", ";LAYER_CHANGE", ";LAYER_CHANGE", "M73 P50 R3", "G1 X2"]
     with SimulatedPrinter(MACHINE) as printer:
@@ -110,7 +110,7 @@ COMMENTED = {
 
 
 @pytest.mark.parametrize("slicer", COMMENTED)
-def test_the_sender_and_the_dry_run_tell_the_same_layer_and_part(slicer: str) -> None:
+def test_the_sender_and_the_dry_run_report_the_same_layer_and_part(slicer: str) -> None:
     shown: list[PrintStatus] = []
     with SimulatedPrinter(MACHINE) as printer:
         print_lines(HEAT + COMMENTED[slicer], printer.path, 250000, on_progress=shown.append, medium=PATIENT)
@@ -125,14 +125,14 @@ def test_m73_and_m220_count_in_lower_case_too() -> None:
     assert (shown[-1].share, shown[-1].feed_percent) == (0.5, 80.0)
 
 
-def test_of_lines_that_are_read_once_the_total_is_not_known() -> None:
+def test_the_total_of_an_iterator_of_lines_is_unknown() -> None:
     shown: list[PrintStatus] = []
     with SimulatedPrinter(MACHINE) as printer:
         print_lines(iter(["G21", "G90"]), printer.path, 250000, on_progress=shown.append, medium=PATIENT)
     assert (shown[-1].acknowledged, shown[-1].total) == (2, None)
 
 
-def test_how_long_a_line_may_be_follows_from_the_machine_s_firmware() -> None:
+def test_the_maximum_line_length_depends_on_the_machine_s_firmware() -> None:
     lines = ["G21", "M117 " + "x" * 95]
     duet = load(settings=["machine.dialect=reprapfirmware"])
     printer = VirtualPrinter(duet.machine)
@@ -225,7 +225,7 @@ def test_ctrl_c_leaves_heaters_off_and_is_passed_on() -> None:
         assert happened(printer.record, "nozzle 200")
 
 
-def test_an_error_of_the_callers_own_code_leaves_heaters_off() -> None:
+def test_an_error_in_the_callers_code_leaves_the_heaters_off() -> None:
     def burst(progress: PrintStatus) -> None:
         if progress.sent > 1:
             raise ZeroDivisionError
@@ -251,7 +251,7 @@ def test_random_faults_end_in_the_exact_moves_or_in_an_error(seed: int) -> None:
         assert_executed(printer.record, PROGRAM, whole)
 
 
-def test_a_killed_printer_ends_the_print_with_its_own_words() -> None:
+def test_a_killed_printer_ends_the_print_with_its_own_error() -> None:
     with SimulatedPrinter(MACHINE, speed=5.0) as printer:
         intruder = os.open(printer.path, os.O_WRONLY | os.O_NOCTTY)
         kill = _once_sent(9, lambda: os.write(intruder, b"\nM112\n"))

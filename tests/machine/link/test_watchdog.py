@@ -110,7 +110,7 @@ STRANGER = load(settings=["machine.dialect=klipper"])  # its printer does not kn
 PARTS = [line for part in range(9) for line in (f"M486 S{part}", f"G1 X{part + 1} F6000", "M73 P5 R1", "M486 S-1")]
 
 
-def test_what_the_firmware_does_not_know_is_asked_once_and_left_out_then() -> None:
+def test_a_command_unknown_to_the_firmware_is_sent_once_and_then_omitted() -> None:
     printer, sent = VirtualPrinter(STRANGER.machine), list[bytes]()
     medium = tap(lambda way, data: sent.append(data) if way == ">" else None, printer.medium)
     outcome = print_lines(["G28", *PARTS], PATH, medium=medium, profile=STRANGER)
@@ -120,7 +120,7 @@ def test_what_the_firmware_does_not_know_is_asked_once_and_left_out_then() -> No
     assert len(printer.record.end) == 9
 
 
-def test_what_matters_is_sent_although_the_firmware_does_not_know_it() -> None:
+def test_an_essential_command_is_sent_although_the_firmware_does_not_know_it() -> None:
     reports = PrinterReports(0.0)
     for said in ('Unknown command: "M104 S200"', 'Unknown command: "M900 K0.1"'):
         reports.read(Event(Kind.ECHO, said), 0.0)
@@ -138,7 +138,7 @@ def test_every_firmware_s_words_for_an_unknown_command_are_counted_as_one(said: 
     assert reports.warnings == ["Unknown command: M900 (x 19)"]
 
 
-def test_a_printer_that_waits_for_a_person_says_so_until_it_goes_on() -> None:
+def test_a_printer_that_waits_for_the_user_is_reported_until_it_continues() -> None:
     shown: list[str] = []
     printer = VirtualPrinter(
         PROFILE.machine, faults=FaultScript((Fault("error", at=9, unit="line", text="echo:busy: paused for user"),))

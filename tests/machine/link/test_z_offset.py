@@ -83,7 +83,7 @@ def test_a_z_offset_requested_while_a_print_finishes_is_neither_sent_nor_taken_b
     assert [line for line in watcher.lines() if line.startswith("M290")] == []
 
 
-def test_a_z_offset_that_was_taken_back_or_never_sent_is_not_reported_as_kept() -> None:
+def test_a_z_offset_undone_or_never_sent_is_not_reported_as_kept() -> None:
     pending = PendingCommands(axes_of(load(machine="fractal5pro").machine), babystep="SET_GCODE_OFFSET Z_ADJUST={} MOVE=1")
     pending.accept(PendingCommand(Command.BABYSTEP, -0.05), PrintState.PRINTING, 0.0)
     assert pending.kept == ""
@@ -94,7 +94,7 @@ def test_a_z_offset_that_was_taken_back_or_never_sent_is_not_reported_as_kept() 
     ("generic_ac", ""),  # homing resets the offset
     ("fractal5pro", "the printer keeps the Z offset of -0.05 mm: before another print send it SET_GCODE_OFFSET Z_ADJUST=0.050"),
 ])  # fmt: skip
-def test_a_cancelled_print_tells_of_a_z_offset_that_the_printer_keeps(machine: str, sentence: str) -> None:
+def test_a_cancelled_print_reports_a_z_offset_kept_by_the_printer(machine: str, sentence: str) -> None:
     profile = load(machine=machine)
     watcher = watched({100: (Command.BABYSTEP, -0.05), 200: Command.CANCEL}, profile=profile)
     outcome = watcher.run(letters(profile))
@@ -111,7 +111,7 @@ def test_a_cancelled_print_sets_feed_and_flow_back(machine: str) -> None:
     assert watcher.lines()[-3:] == ["M220 S100", "M221 S100", "M105"]
 
 
-def test_a_failed_print_tells_what_the_printer_keeps() -> None:
+def test_a_failed_print_reports_the_values_kept_by_the_printer() -> None:
     profile = load(machine="fractal5pro")
     cut = Fault("disconnect", at=250, unit="line")
     watcher = watched({50: (Command.BABYSTEP, -0.05), 60: (Command.FEED, 150.0)}, cut, profile=profile)
@@ -120,7 +120,7 @@ def test_a_failed_print_tells_what_the_printer_keeps() -> None:
         watcher.run(letters(profile))
 
 
-def test_a_print_that_the_caller_ends_by_an_error_tells_what_the_printer_keeps() -> None:
+def test_a_print_ended_by_an_error_of_the_caller_reports_the_values_kept_by_the_printer() -> None:
     def interrupt() -> None:
         raise KeyboardInterrupt
 

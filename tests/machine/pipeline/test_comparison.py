@@ -47,7 +47,7 @@ def test_a_tee_straight_up_needs_support_in_parts_or_upside_down_it_does_not() -
     assert best.support_mm3 < 0.1 * up.support_mm3
 
 
-def test_the_alternatives_get_support_even_where_the_process_gives_none() -> None:
+def test_the_alternatives_use_support_even_if_the_process_disables_it() -> None:
     ours, up, _ = compared()[2]
     assert ours.support_mm3 == 0.0
     assert up.support_mm3 > 100.0
@@ -60,7 +60,7 @@ def test_an_alternative_that_the_machine_cannot_print_stays_in_the_list_with_the
     assert up.message in compare_table((up,))
 
 
-def test_marks_and_modifiers_hold_for_the_model_in_one_part_too_as_it_lies() -> None:
+def test_marks_and_modifiers_apply_to_the_one_part_alternatives_in_each_orientation() -> None:
     profile, over_arm = load(settings=COARSE), Zone((5.5, -99.0, 24.0), (99.0, 99.0, 99.0))
     zones = Zones(no_support=(over_arm,), modifiers=(Modifier(Zone((-99.0, -99.0, -1.0), (99.0, 99.0, 99.0)), {"walls": 3}),))
     marked = decompose(tee(), "tee", profile, SearchRequest(plan=PlanFile("plan.toml", zones=zones), parts=1))
@@ -94,7 +94,7 @@ def test_stairs_of_a_model_in_one_piece_are_those_of_its_slanted_faces_searched_
     assert [row["stairs_mm2"] for row in alternatives_json((searched, up, up))] == pytest.approx([20.0] * 3)
 
 
-def test_a_joint_of_a_print_tells_how_its_first_layer_lies_as_its_dry_run_has_it() -> None:
+def test_a_joint_reports_the_same_first_layer_contact_as_the_dry_run() -> None:
     profile, program, (ours, _, _) = compared()
     (joint,), (face,) = ours.joints, program.run.interfaces
     assert joint == joints_of_print(program, profile)[0]

@@ -33,17 +33,17 @@ def test_a_log_names_the_compilation_once(unmarked, monkeypatch, capsys):
     assert capsys.readouterr().err.count("compiling the kernels") == 1
 
 
-def test_where_no_process_can_be_had_the_work_goes_on(unmarked, monkeypatch):
+def test_work_continues_if_no_process_can_be_started(unmarked, monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
     Compilers().wait_for(["judge"])
     assert not (unmarked / "judge").exists()
 
 
-def test_where_no_interpreter_is_found_the_work_goes_on(unmarked, monkeypatch):
+def test_work_continues_if_no_interpreter_is_found(unmarked, monkeypatch):
     monkeypatch.setattr(sys, "executable", str(unmarked / "python"))
     Compilers().wait_for(["judge"])
     assert not (unmarked / "judge").exists()
 
 
-def test_every_bundle_has_a_mark_of_its_own():
+def test_every_bundle_has_its_own_mark():
     assert len({mark(bundle) for bundle in BUNDLES}) == len(BUNDLES)

@@ -19,7 +19,7 @@ def test_every_shipped_profile_comes_back_from_a_file_s_foot(machine: str) -> No
     assert set(taken) == {"machine", "material", "process", "search"}
 
 
-def test_what_the_user_has_named_is_not_taken_from_the_file() -> None:
+def test_a_profile_named_by_the_user_is_not_taken_from_the_file() -> None:
     read, taken = read_embedded_profile(tuple(foot(load(), 1.0, 1.0)), OTHER, frozenset({"machine"}))
     assert (read.machine.lift_mm, read.process.walls, "machine" in taken) == (33.0, load().process.walls, False)
 

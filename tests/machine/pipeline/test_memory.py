@@ -21,7 +21,7 @@ def test_a_system_without_glibc_is_left_alone(monkeypatch: pytest.MonkeyPatch) -
     return_unused()
 
 
-def test_glibc_is_told_to_give_back_all_that_lies_unused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_glibc_is_asked_to_return_all_unused_memory(monkeypatch: pytest.MonkeyPatch) -> None:
     told = []
     monkeypatch.setattr(ctypes, "CDLL", lambda name: type("Library", (), {"malloc_trim": staticmethod(told.append)}))
     return_unused()

@@ -21,7 +21,7 @@ WHOLE = FrontRow((), 300.0, 0.0, 425.4, stairs_mm2=125.4, time_s=3723.0, filamen
 CUT = FrontRow(PLANES, 30.0, 80.0, 78.0, stairs_mm2=6.0, time_s=3600.0, filament_mm=3900.0)
 
 
-def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> None:
+def test_a_reoriented_model_is_reported_with_its_benefit() -> None:
     oriented = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
     side, upright = best_orientation(tee(), 45.0), facet_orientations(tee(), 45.0)[0]
     assert orientation_in_words(Oriented(side, oriented, 900.0, CUT, upright, True, True), "--as-is keeps it so") == (
@@ -35,7 +35,7 @@ def test_a_model_that_was_laid_down_is_told_with_what_that_is_better_by() -> Non
     assert orientation_in_words(Oriented(None, oriented, 900.0, WHOLE, upright, True, True), "--as-is keeps it so") == ()
 
 
-def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
+def test_a_model_left_on_too_small_a_base_is_reported() -> None:
     oriented = Oriented(None, alone(tee(), 300.0), 900.0, WHOLE, facet_orientations(tee(), 45.0)[0], False, False)
     warning = (
         "its base may be too small to hold it: consider a wide brim (process.brim_mm) or another orientation (process.rotate_deg)"
@@ -46,7 +46,7 @@ def test_a_model_that_stays_on_a_base_too_small_for_it_is_told_so() -> None:
     assert orientation_in_words(turned, "--as-is keeps it so")[1:] == (HARDLY_HELD,)
 
 
-def test_a_model_that_is_turned_because_the_plate_would_not_hold_it_is_told_so() -> None:
+def test_a_model_turned_because_it_would_hardly_adhere_to_the_plate_is_reported() -> None:
     laid = replace(alone(tee(), 0.0), front=(FrontRow((), 0.0, 0.0, 0.0, chosen=True, time_s=1800.0, filament_mm=3000.0),))
     side, upright = best_orientation(tee(), 45.0), facet_orientations(tee(), 45.0)[0]
     (told,) = orientation_in_words(Oriented(side, laid, 900.0, None, upright, True, False), "--as-is keeps it so")

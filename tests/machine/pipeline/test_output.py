@@ -8,7 +8,7 @@ from machine.pipeline.output import check_writable, write_bytes, write_json, wri
 from profiles.errors import OutputError
 
 
-def test_a_file_is_written_whole_and_nothing_stays_beside_it(tmp_path: Path) -> None:
+def test_a_file_is_written_completely_and_leaves_no_temporary_file(tmp_path: Path) -> None:
     write_lines(tmp_path / "a.gcode", ["G28", "M84"])
     assert [file.name for file in tmp_path.iterdir()] == ["a.gcode"]
     assert (tmp_path / "a.gcode").read_text() == "G28\nM84\n"

@@ -100,7 +100,7 @@ def test_red_faces_are_red_and_the_others_are_not() -> None:
     assert share_like(behind, RED) == 0.0
 
 
-def test_normals_are_blended_over_a_ball_and_kept_apart_at_the_edges_of_a_box() -> None:
+def test_normals_are_smooth_on_a_ball_and_separate_at_the_edges_of_a_box() -> None:
     sphere, cube = ball(10.0, 64), box()
     radial = (sphere.vertices - (0, 0, 10))[sphere.faces] / 10.0
     assert np.einsum("ijk,ijk->ij", corner_normals(sphere), radial).min() > 0.999
@@ -150,7 +150,7 @@ def ink(image: NDArray[np.uint8]) -> int:
     return int(((image.max(axis=2) < 200) & (np.ptp(image.astype(int), axis=2) == 0)).sum())
 
 
-def test_a_frame_shows_its_number_and_how_the_table_stands() -> None:
+def test_a_frame_shows_its_number_and_the_table_s_pose() -> None:
     frames = contact_sheet(example(), PROFILE.machine, 480)[480 // 12 :]
     numbers = [frames[:60, left : left + 60] for left in (0, 480)]
     assert all(100 < ink(number) < 1000 for number in numbers)
@@ -193,7 +193,7 @@ def test_every_row_has_a_frame_with_its_parts_in_colour_and_the_one_taken_a_bord
     assert (whole[0] == 255).all()
 
 
-def test_the_pictures_asked_for_stand_after_the_first_comments_and_are_png_of_that_size() -> None:
+def test_requested_thumbnails_follow_the_first_comments_and_are_png_of_the_given_size() -> None:
     profile, decomposition, _, _ = printed("generic_ac")
     asked = load(settings=["machine.thumbnails_px=[[32, 24], [160, 120]]"])
     lines = with_thumbnails(Lines.of(text("generic_ac")), decomposition, asked)
@@ -206,13 +206,13 @@ def test_the_pictures_asked_for_stand_after_the_first_comments_and_are_png_of_th
     assert len(parse_gcode(lines, profile.machine).line) == len(parse_gcode(text("generic_ac"), profile.machine).line)
 
 
-def test_the_length_told_is_that_of_the_base64_and_no_line_is_longer_than_80() -> None:
+def test_the_thumbnail_length_is_that_of_its_base64_and_lines_are_at_most_80_characters() -> None:
     lines = thumbnail(bytes(range(256)) * 3, 16, 16)
     assert lines[0] == "; thumbnail begin 16x16 1024"
     assert sum(len(line) - 2 for line in lines[1:-1]) == 1024
     assert {len(a) for a, _ in pairwise(lines[1:-1])} == {80}
 
 
-def test_without_a_wish_there_is_no_picture() -> None:
+def test_no_thumbnail_is_written_unless_requested() -> None:
     profile, decomposition, _, _ = printed("generic_ac")
     assert with_thumbnails(Lines.of(text("generic_ac")), decomposition, profile) == tuple(text("generic_ac"))

@@ -84,7 +84,7 @@ def test_pins_are_filled_without_a_finding_and_the_part_too_slender_for_one_is_n
     assert "no pins under part 2: a pin needs an area 4.6 mm wide" in capsys.readouterr().err
 
 
-def test_a_vase_that_ends_below_a_tip_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_vase_that_stops_below_a_tip_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     cone = cut(from_manifold(m3.Manifold.cylinder(6, 6, 0, 48)))
     profile = load(settings=["process.spiral_vase=true", "process.support=none"])
     program = build(Decomposition("cone", cone[0].mesh, tuple(cone), 1, "classic", 0.0, 0.0, 0, 1, 0.0), profile)

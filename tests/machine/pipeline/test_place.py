@@ -50,7 +50,7 @@ def printed_middle(x: float, y: float) -> np.ndarray:
     return middle
 
 
-def test_a_plan_gives_the_same_parts_wherever_the_model_stands_and_they_are_printed_there() -> None:
+def test_a_plan_gives_the_same_parts_at_any_model_place_and_prints_them_there() -> None:
     here, there = in_arms(at(0, 0)), in_arms(at(20, -10))
     assert [part.mesh.vertices.tolist() for part in here.parts] == [part.mesh.vertices.tolist() for part in there.parts]
     assert printed_middle(20, -10) - printed_middle(0, 0) == pytest.approx([20.0, -10.0], abs=0.1)
@@ -86,14 +86,14 @@ def test_a_place_over_the_edge_is_refused_in_the_sentence_of_export() -> None:
         build(Decomposition("box", box(), (whole(box()),), 1, "classic", 0.0, 0.0, 0, 0, 0.0), profile)
 
 
-def test_one_piece_to_compare_with_stands_at_the_same_place() -> None:
+def test_the_one_piece_comparison_is_at_the_same_place() -> None:
     profile = at(60, 0)  # at twice the offset it would extend over the edge
     ways = compare_with_one_part(build(in_arms(profile), profile), profile)
     assert [way.message for way in ways if "edge" in way.message] == []
     assert all(way.time_s is not None for way in ways)
 
 
-def test_copies_stand_about_the_place_and_where_they_have_no_room_there_anywhere() -> None:
+def test_copies_are_placed_around_the_place_or_anywhere_if_they_do_not_fit_there() -> None:
     machine = at(0, 0).machine
     assert places_on_plate((20.0, 20.0), 5.0, 1, machine, (30.0, 10.0)) == [(30.0, 10.0)]
     near = np.array(places_on_plate((20.0, 20.0), 5.0, 4, machine, (30.0, 10.0)))

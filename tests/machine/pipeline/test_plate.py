@@ -51,14 +51,14 @@ def plate(*settings: str) -> Profile:
 
 
 @pytest.mark.parametrize(("count", "reach_mm"), [(1, 0.0), (2, 12.5), (4, 17.7), (5, 25.0), (9, 35.4)])
-def test_copies_stand_in_rows_near_the_middle(count: int, reach_mm: float) -> None:
+def test_copies_are_placed_in_rows_near_the_middle(count: int, reach_mm: float) -> None:
     places = np.array(places_on_plate((20.0, 20.0), 5.0, count, plate().machine))
     assert np.hypot(*places.T).max() == pytest.approx(reach_mm, abs=0.1)
     apart = np.abs(places[:, None] - places[None]).max(axis=2) + 99.0 * np.eye(count)
     assert apart.min() >= 25.0 - 1e-9
 
 
-def test_as_many_copies_stand_on_an_oblong_plate_as_have_room_in_rows() -> None:
+def test_an_oblong_plate_takes_as_many_copies_as_fit_in_rows() -> None:
     machine = load(settings=["machine.table.size_mm=[196, 99]"]).machine
     places = places_on_plate((20.0, 20.0), 5.0, 1000, machine)
     assert len(places) == int((196 - 4 + 5) / 25) * int((99 - 4 + 5) / 25)  # 2 mm stay free at every edge
@@ -73,7 +73,7 @@ def test_copies_on_a_round_plate_keep_to_its_edge_and_apart() -> None:
     assert min(a.distance(b) for a, b in combinations(boxes, 2)) == pytest.approx(5.0)
 
 
-def test_copies_stand_where_the_head_that_prints_them_stays_clear_of_a_clip() -> None:
+def test_copies_are_placed_so_that_the_head_stays_clear_of_a_clip() -> None:
     machine = load(settings=["machine.head.silhouette_mm=[[0.6, 0], [8, 5], [20, 30]]", "machine.head.boxes=[]"]).machine
     clip = TableBox(name="clip", min_mm=(-20.0, -90.0, 0.0), max_mm=(20.0, -30.0, 12.0))
     clipped = machine.model_copy(update={"table": machine.table.model_copy(update={"clips": [clip]})})
@@ -102,7 +102,7 @@ def test_copies_around_a_clip_are_printed_without_a_collision_on_the_ways_betwee
     assert len(travels) > 0  # the tip rises to cross the clip
 
 
-def test_models_of_several_sizes_stand_clear_of_a_clip() -> None:
+def test_models_of_several_sizes_are_placed_clear_of_a_clip() -> None:
     profile = clipped((-20.0, -20.0, 0.0), (20.0, 20.0, 10.0))
     models = [decomposed(whole(box(side, side, 4)), name=f"{side:g}") for side in (30.0, 16.0, 12.0)]
     decomposition, profile = on_one_plate(models, profile)
@@ -126,7 +126,7 @@ def test_every_copy_has_the_settings_of_its_modifiers() -> None:
     assert sorted(meshes) == [-9.5, 5.5]
 
 
-def test_a_modifier_that_reaches_beyond_its_model_changes_no_copy_beside_it() -> None:
+def test_a_modifier_that_extends_beyond_its_model_does_not_change_adjacent_copies() -> None:
     half = Modifier(Zone((-99.0, 0.0, -1.0), (99.0, 99.0, 99.0)), {"infill_density": 1.0})
     (many,) = in_copies(decomposed(replace(whole(box(10, 10, 9)), modifiers=(half,))), 2, plate())[0].parts
     (place,) = modified_places(many, many.in_part_frame(), plate().process, np.array([4.5]))
@@ -160,7 +160,7 @@ def test_marks_go_along_with_every_copy() -> None:
 
 
 @pytest.mark.parametrize("axes", [None, ((0.0, 1.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 0.0, 1.0))])
-def test_a_box_that_reaches_beyond_its_model_marks_no_copy_beside_it(axes: Any) -> None:
+def test_a_box_that_extends_beyond_its_model_does_not_mark_adjacent_copies(axes: Any) -> None:
     ring = together([box(4, 10, 9).transform(np.eye(3), (x, 0.0, 0.0)) for x in (-8.0, 8.0)])
     right = Zone((2.0, -99.0, -1.0), (99.0, 99.0, 99.0))
     if axes is not None:
@@ -177,7 +177,7 @@ def test_a_box_that_reaches_beyond_its_model_marks_no_copy_beside_it(axes: Any) 
         assert (section ^ area).area() == pytest.approx(0.5 * section.area())
 
 
-def test_a_box_of_a_model_that_is_printed_alone_does_not_reach_into_those_that_stand_beside_it() -> None:
+def test_a_box_of_a_sequentially_printed_model_does_not_reach_into_adjacent_models() -> None:
     everywhere = Marked((Zone((-99.0, -99.0, -1.0), (99.0, 99.0, 99.0)),))
     part = replace(whole(box(10, 10, 9)), no_seam=everywhere, no_support=everywhere, support=everywhere)
     one, other = in_copies(decomposed(part), 2, plate("process.complete_objects=true"))[0].parts
@@ -220,7 +220,7 @@ def test_a_refused_part_is_named_by_its_model_too() -> None:
         raise MoveError("part 1 reaches X 99 mm")
 
 
-def test_each_plan_goes_with_the_model_that_it_names(tmp_path: Path) -> None:
+def test_each_plan_applies_to_the_model_it_names(tmp_path: Path) -> None:
     for name in ("tee", "hook"):
         (tmp_path / f"{name}.toml").write_text(f'version = 1\nmodel = "{name}.stl"\n')
     tee_plan, hook_plan = tmp_path / "tee.toml", tmp_path / "hook.toml"
@@ -275,7 +275,7 @@ def beads_of(program: Program) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return run.program.part[rows], run.program.layer[rows], y < -5.0
 
 
-def test_models_of_two_sizes_stand_five_millimetres_apart_about_the_middle() -> None:
+def test_models_of_two_sizes_are_placed_five_millimetres_apart_around_the_middle() -> None:
     print_, _ = large_and_small()
     large, small = boxes_of(print_)
     assert large.distance(small) == pytest.approx(5.0)
@@ -283,7 +283,7 @@ def test_models_of_two_sizes_stand_five_millimetres_apart_about_the_middle() -> 
     assert (print_.name, len(print_.parts)) == ("large, small", 1)
 
 
-def test_layer_by_layer_both_models_lie_in_every_layer_that_both_reach() -> None:
+def test_layer_by_layer_printing_puts_both_models_in_every_layer_they_reach() -> None:
     program = build(*large_and_small())
     part, layer, is_small = beads_of(program)
     assert set(part.tolist()) == {1}
@@ -314,7 +314,7 @@ def test_a_model_printed_after_another_gets_the_first_layer_that_it_would_have_a
     assert second.run.errors == ()
 
 
-def test_where_the_head_would_meet_a_tall_model_the_next_one_stands_farther_away() -> None:
+def test_a_model_next_to_a_tall_one_is_placed_far_enough_away_for_the_head() -> None:
     models = [decomposed(whole(box(20, 20, height)), name=str(height)) for height in (12, 12.5)]
     gaps = []
     for settings in ((), ("process.complete_objects=true",)):
@@ -324,7 +324,7 @@ def test_where_the_head_would_meet_a_tall_model_the_next_one_stands_farther_away
     assert gaps == pytest.approx([5.0, 17.5])  # a multiple of 2.5 mm
 
 
-def test_models_that_the_head_cannot_pass_are_refused_with_what_goes() -> None:
+def test_models_the_head_cannot_pass_are_refused_with_alternatives() -> None:
     models = [decomposed(whole(box(60, 60, height)), name=f"{height} high") for height in (70, 75, 80)]
     with pytest.raises(PlanError) as refused:
         on_one_plate(models, plate("process.complete_objects=true"))
@@ -358,7 +358,7 @@ def test_a_model_that_is_too_high_among_others_is_named() -> None:
         on_one_plate(models, plate())
 
 
-def test_parts_that_are_printed_tilted_follow_beside_the_other_model_and_no_finding_tells_of_it() -> None:
+def test_tilted_parts_are_printed_next_to_another_model_without_a_finding() -> None:
     tilted = decomposed(*cut(box(20, 20, 14), ((0.5, 0.0, 1.0), 9.0)), name="tilted")
     print_, profile = on_one_plate([tilted, decomposed(whole(box(10, 10, 9)), name="post")], plate())
     assert [part.index for part in print_.parts] == [1, 2]

@@ -18,7 +18,7 @@ def test_every_row_that_costs_less_than_those_with_fewer_parts_has_a_price() -> 
     assert all(row.time_s is not None and row.time_s > 60.0 and row.filament_mm is not None for row in front)
 
 
-def test_parts_that_cannot_be_sliced_have_none() -> None:
+def test_unsliceable_parts_have_no_price() -> None:
     profile = load(settings=COARSE)
     part = decompose(shapes.branch(), "branch", profile).parts[0]
     open_mesh = Mesh(part.mesh.vertices, part.mesh.faces[1:])

@@ -30,7 +30,7 @@ def test_a_profile_with_changes_is_saved_and_read_back_the_same(name: str, setti
     assert check_file(file) == []
 
 
-def test_a_profile_says_what_differs_from_the_shipped_one_that_it_goes_back_to(tmp_path: Path) -> None:
+def test_a_profile_lists_its_differences_from_the_shipped_profile_it_inherits(tmp_path: Path) -> None:
     own = tmp_path / "own.toml"
     own.write_text('inherits = "pla"\n[material]\nname = "my PLA"\nbed_c = 55\n')
     assert profile_text("material", str(own), ["material.fan=0.8"]) == (
@@ -47,7 +47,7 @@ def test_a_value_that_is_stated_stays_when_the_shipped_profile_changes() -> None
 
 
 @pytest.mark.parametrize("kind", ["machine", "material", "process"])
-def test_every_shipped_profile_can_be_kept_as_it_is(kind: str, tmp_path: Path) -> None:
+def test_every_shipped_profile_can_be_saved_unchanged(kind: str, tmp_path: Path) -> None:
     for name in known(kind):
         (tmp_path / f"{name}-own.toml").write_text(profile_text(kind, name))
         assert load_one(str(tmp_path / f"{name}-own.toml")) == load_one(name)

@@ -101,7 +101,7 @@ def test_a_project_of_several_models_has_the_copies_of_each(folder: Path) -> Non
         ("--parts", "1", "--orient"),
     ],
 )
-def test_a_project_prints_as_what_it_was_saved_from_wherever_it_lies(folder: Path, options: tuple[str, ...]) -> None:
+def test_a_moved_project_prints_the_same_as_the_model_it_was_saved_from(folder: Path, options: tuple[str, ...]) -> None:
     run("export", "tee.stl", *FAST, *options, "-o", "before.gcode")
     run("save", "tee.stl", *FAST, *options, "-o", "tee.3mf")
     elsewhere = folder / "elsewhere"
@@ -125,7 +125,7 @@ def test_options_on_the_command_line_hold_over_those_of_the_project() -> None:
 
 
 @pytest.mark.usefixtures("folder")
-def test_other_programs_read_the_model_as_it_lies_and_a_picture() -> None:
+def test_other_programs_read_the_oriented_model_and_its_thumbnail() -> None:
     run("save", "tee.stl", *FAST, "--parts", "1", "--as-is", "--set", "process.rotate_deg=[90,0,0]", "-o", "tee.3mf")
     scene = trimesh.load("tee.3mf")
     laid, _ = read_mesh(Path("tee.stl"), 1.0, (90.0, 0.0, 0.0))
@@ -223,7 +223,7 @@ def test_a_model_s_name_that_no_file_can_have_is_damage(name: str, capsys: pytes
 
 
 @pytest.mark.usefixtures("project")
-def test_files_of_a_project_never_lie_outside_its_folder(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_project_with_files_outside_its_folder_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     changed(Path("tee.3mf"), INSIDE + "../../outside.txt", b"x")
     assert main(["export", "tee.3mf", "-o", "after.gcode"]) == 1
     assert "this project is damaged" in capsys.readouterr().err
@@ -241,7 +241,7 @@ def test_a_project_that_is_read_is_never_written_over(words: tuple[str, ...], ca
 
 
 @pytest.mark.usefixtures("folder")
-def test_a_name_with_letters_of_all_kinds_is_kept() -> None:
+def test_a_model_name_with_unusual_characters_is_kept() -> None:
     name = "my\u00a0t\u00e9e \u732b '1'.stl"
     Path("tee.stl").rename(name)
     run("save", name, *FAST, "--parts", "1", "--as-is", "-o", "tee.3mf")
@@ -296,7 +296,7 @@ def test_a_record_that_no_project_has_is_damage(
 
 
 @pytest.mark.usefixtures("project")
-def test_a_project_whose_archive_has_entries_for_folders_opens() -> None:
+def test_a_project_archive_with_folder_entries_opens() -> None:
     changed(Path("tee.3mf"), INSIDE, b"")
     run("decompose", "tee.3mf", "-o", "parts")
 
@@ -309,7 +309,7 @@ def test_a_pause_before_a_part_that_does_not_exist_is_not_saved(capsys: pytest.C
 
 
 @pytest.mark.usefixtures("project")
-def test_a_project_whose_model_was_replaced_is_damage(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_project_with_a_replaced_model_is_damaged(capsys: pytest.CaptureFixture[str]) -> None:
     with zipfile.ZipFile("tee.3mf") as archive:
         (model,) = (name for name in archive.namelist() if name.startswith(INSIDE + "model-"))
     changed(Path("tee.3mf"), model, Path("insert.stl").read_bytes())
@@ -339,13 +339,13 @@ def test_a_batch_has_its_options_over_a_project_as_export_has() -> None:
 
 @pytest.mark.parametrize("models", [("tee.3mf", "tee.stl"), ("tee.stl", "tee.3mf"), ("tee.3mf:2",)])
 @pytest.mark.usefixtures("project")
-def test_a_project_is_a_plate_of_its_own(models: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_project_cannot_share_a_plate_with_other_models(models: tuple[str, ...], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["export", *models, "-o", "after.gcode"]) == 1
     assert "is a project, which is a plate of its own" in capsys.readouterr().err
 
 
 @pytest.mark.usefixtures("folder")
-def test_another_process_replaces_the_settings_of_the_project_but_not_how_the_model_lies() -> None:
+def test_another_process_replaces_the_project_s_settings_but_keeps_the_model_s_orientation() -> None:
     lying = ("--parts", "1", "--as-is", "--set", "process.scale=0.5")
     run("save", "tee.stl", *lying, "--set", "process.layer_height_mm=0.3", "-o", "tee.3mf")
     run("export", "tee.3mf", "--process", "draft", "-o", "after.gcode")

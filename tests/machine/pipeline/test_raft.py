@@ -97,18 +97,18 @@ def test_a_model_alone_on_a_raft_of_any_height_has_no_finding(count: int) -> Non
     ],
     ids=["no second layer", "no upper layers", "no raft", "a model too high", "a model in its raft", "a lean raft"],
 )
-def test_a_fault_in_a_raft_or_above_it_is_found(code: str, edit: Callable[[list[str]], list[str]]) -> None:
+def test_a_fault_in_or_above_a_raft_is_found(code: str, edit: Callable[[list[str]], list[str]]) -> None:
     profile = load(settings=[RAFT])
     lines = list(build(alone(box(15, 15, 4), profile), profile).lines)
     assert code in {finding.code for finding in dry_run(edit(lines), profile).errors}
 
 
-def test_the_heights_told_of_layers_count_from_the_plate() -> None:
+def test_reported_layer_heights_are_measured_from_the_plate() -> None:
     told = [float(line[3:]) for line in printed(RAFT).lines if re.match(";Z:", line)]
     assert told[:4] == pytest.approx([0.3, 0.6, 0.9, LIFT_MM + 0.3])
 
 
-def test_copies_leave_room_for_their_rafts_and_each_stands_on_one() -> None:
+def test_copies_leave_room_for_their_rafts_and_each_has_its_own() -> None:
     profile = load(settings=[RAFT, "process.complete_objects=true", "process.skirt_loops=0"])
     model = alone(box(15, 15, 4), profile)
     decomposition, settings = on_one_plate([model, model], profile)
@@ -149,7 +149,7 @@ def test_a_raft_and_a_pedestal_are_refused_together() -> None:
         load(settings=[RAFT, "search.pedestal_mm=5"])
 
 
-def test_what_is_lifted_and_lowered_is_what_it_was() -> None:
+def test_lifting_and_lowering_a_model_leaves_it_unchanged() -> None:
     profile = coarse()
     model = cut_by_plan(tee(), "T", profile, SearchRequest(plan=ARM))
     back = standing_at(standing_at(model, (0.0, 0.0), 0.75), (0.0, 0.0), -0.75)
@@ -158,7 +158,7 @@ def test_what_is_lifted_and_lowered_is_what_it_was() -> None:
     assert back.parts[1].base.offset_mm == pytest.approx(model.parts[1].base.offset_mm)
 
 
-def test_alternatives_in_one_part_stand_on_a_raft_too() -> None:
+def test_one_part_alternatives_are_printed_on_a_raft_too() -> None:
     _, up, _ = compare_with_one_part(printed(RAFT), coarse(RAFT))
     assert up.message == ""
     _, plain, _ = compare_with_one_part(printed(), coarse())

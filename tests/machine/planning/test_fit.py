@@ -40,7 +40,7 @@ def test_a_part_larger_than_the_axes_is_refused_before_it_is_sliced(scale: tuple
         (["machine.table.size_mm=[150, 149]"], r"0.3 mm over the edge of the plate of .*, it measures 150 x 149 mm"),
     ],
 )
-def test_a_model_that_stands_over_the_plates_edge_is_refused_before_it_is_sliced(settings: list[str], message: str) -> None:
+def test_a_model_overhanging_the_plate_edge_is_refused_before_slicing(settings: list[str], message: str) -> None:
     profile = load(settings=settings)
     with pytest.raises(MoveError, match=message):
         check_parts([one_piece(box(150, 150, 2), profile.machine)], profile)
@@ -48,7 +48,7 @@ def test_a_model_that_stands_over_the_plates_edge_is_refused_before_it_is_sliced
 
 
 @pytest.mark.parametrize(("place", "is_refused"), [("[0, 0]", False), ("[0, -40]", True), ("[52, -40]", False)])
-def test_a_model_that_stands_on_a_clip_is_refused_before_it_is_sliced(place: str, is_refused: bool) -> None:
+def test_a_model_on_a_clip_is_refused_before_slicing(place: str, is_refused: bool) -> None:
     profile = load(settings=[f"process.place_mm={place}"])
     clip = TableBox(name="front clip", min_mm=(-30.0, -95.0, 0.0), max_mm=(30.0, -55.0, 6.0))
     table = profile.machine.table.model_copy(update={"clips": [clip]})

@@ -31,11 +31,11 @@ def _short(z_mm: float) -> Profile:
 
 
 @pytest.mark.parametrize("model", sorted(MODELS))
-def test_a_limb_is_printed_beside_what_stands_without_a_finding(model: str) -> None:
+def test_a_limb_is_printed_next_to_earlier_parts_without_an_error(model: str) -> None:
     assert printed(model)[1].errors == ()
 
 
-def test_the_way_from_one_limb_to_the_other_leads_over_the_post_between_them() -> None:
+def test_travel_between_limbs_passes_over_the_post_between_them() -> None:
     starts, ends = moved_part(printed("outer posts")[0], 2)
     crosses = starts[:, 0] * ends[:, 0] < 0.0
     least = np.minimum(starts[crosses, 2], ends[crosses, 2])
@@ -55,7 +55,7 @@ def test_the_dry_run_refuses_the_same_limbs_without_the_lifts(monkeypatch: pytes
     assert codes == {"contact"}
 
 
-def test_a_z_axis_too_short_for_the_way_over_what_stands_is_told() -> None:
+def test_a_z_axis_too_short_to_pass_over_earlier_parts_is_reported() -> None:
     _, decomposition, pieces = sliced("outer posts")
     with pytest.raises(MoveError, match=r"part 2: the way to it needs the tip at Z 25\.2 mm"):
         plan(decomposition, pieces, _without_turns(_short(24.5)))
@@ -70,7 +70,7 @@ def _without_turns(profile: Profile) -> Profile:
     return profile.model_copy(update={"machine": profile.machine.model_copy(update={"lift_mm": 0.0})})
 
 
-def test_a_stop_within_a_limb_takes_the_tip_above_all_that_stands() -> None:
+def test_a_stop_within_a_limb_lifts_the_tip_above_everything_printed() -> None:
     program, run = printed("outer posts", [Stop(2, 5, None, False)])
     stop = next(k for k, move in enumerate(moves_of(program)) if isinstance(move, Pause))
     before = moves_of(program)[stop - 1]
@@ -79,7 +79,7 @@ def test_a_stop_within_a_limb_takes_the_tip_above_all_that_stands() -> None:
     assert run.errors == ()
 
 
-def test_ways_across_are_no_lower_than_what_may_stand_there() -> None:
+def test_travel_across_stays_at_or_above_the_given_clearance_height() -> None:
     machine, start, end = load().machine, level(load().machine), Pose(30.0, 0.0)
     at, target = np.array([0.0, 0.0, 20.0]), np.array([10.0, 0.0, 20.0])
     post = hull(np.array([[-5.0, -5.0, 0.0], [5.0, 5.0, 0.0], [5.0, -5.0, 10.0], [-5.0, 5.0, 10.0]]), 0.2)
@@ -90,7 +90,7 @@ def test_ways_across_are_no_lower_than_what_may_stand_there() -> None:
     assert (high.z_mm, high.across_z_mm) == (90.0, 120.0)
 
 
-def test_the_way_back_into_a_limb_after_a_power_cut_leads_over_what_stands() -> None:
+def test_the_return_into_a_limb_after_a_power_cut_passes_over_the_printed_parts() -> None:
     profile, decomposition, _ = sliced("leaning arm")
     arm = decomposition.parts[1]
     stands = hull(decomposition.parts[0].mesh.vertices, 0.3)

@@ -52,11 +52,11 @@ def test_a_plan_outside_is_refused_before_any_text() -> None:
         plan(decomposition, [squares(decomposition.parts[0], profile)], profile.model_copy(update={"machine": machine}))
 
 
-def test_limits_carry_the_machine_s_own_letters() -> None:
+def test_limits_use_the_machine_s_axis_letters() -> None:
     assert list(axis_limits(load(machine="fractal5pro").machine)) == ["X", "Y", "Z", "B", "A"]
 
 
-def test_a_slanted_travel_is_slowed_so_that_z_keeps_its_speed() -> None:
+def test_a_slanted_travel_is_slowed_to_keep_z_within_its_speed() -> None:
     slanted_then_level = np.array([[0, 0, 0], [3, 0, 4], [3, 0, 4], [6, 4, 4]], dtype=float)
     speeds = path_speeds(slanted_then_level, np.array([0, 2, 4]), np.array([150.0, 150.0]), speeds_of(load()).axes_mm_s)
     assert speeds == pytest.approx([15.0 / 0.8, 150.0])

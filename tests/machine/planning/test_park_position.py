@@ -45,7 +45,7 @@ ENDS = [(machine, upright) for machine in MACHINES for upright in (True, False) 
 
 
 @pytest.mark.parametrize(("machine", "upright"), ENDS)
-def test_the_end_block_runs_with_the_tip_beside_the_print_and_above_everything(machine: str, upright: bool) -> None:
+def test_the_end_block_runs_with_the_tip_next_to_the_print_and_above_everything(machine: str, upright: bool) -> None:
     profile, program = program_of(machine, upright)
     lines = list(write_gcode(program, profile))
     parsed = parse_gcode(lines, profile.machine)
@@ -62,7 +62,7 @@ def test_the_end_block_runs_with_the_tip_beside_the_print_and_above_everything(m
     assert not [finding for finding in dry_run(lines, profile).findings if finding.code in ("collision", "limits")]
 
 
-def test_the_distance_beside_a_finished_print_is_kept_to_its_beads_and_not_to_their_middles() -> None:
+def test_the_distance_to_a_finished_print_is_measured_from_the_beads_not_their_centre_lines() -> None:
     profile, program = program_of("generic_ac", True)
     middles = program.points_mm[np.repeat(program.is_stroke, np.diff(program.starts)), :2]
     end = program.points_mm[-1, :2]

@@ -29,7 +29,7 @@ def _strokes(moves, index):
 
 
 @BOTH
-def test_every_stroke_lies_where_the_slicer_put_it_on_the_workpiece(machine: str) -> None:
+def test_every_stroke_is_where_the_slicer_put_it_on_the_workpiece(machine: str) -> None:
     profile, decomposition, sliced, program = printed(machine)
     for index, (part, piece) in enumerate(zip(decomposition.parts, sliced, strict=True)):
         paths = [(layer.z_mm, path) for layer in piece.layers for path in layer.paths]
@@ -91,7 +91,7 @@ def _tall(profile: Profile):
     return decomposition, [squares(part, profile, 300 if part.index == 1 else 2) for part in decomposition.parts]
 
 
-def test_with_a_short_z_axis_the_head_stands_aside() -> None:
+def test_with_a_short_z_axis_the_head_moves_aside_for_a_turn() -> None:
     profile = _cramped(60.5, 160.0, 60.0)
     program = plan(*_tall(profile), profile)
     turn = next(

@@ -55,7 +55,7 @@ def test_an_outer_wall_takes_nothing_where_the_layer_has_anything_inside() -> No
         assert strokes.ways[1::2, 3] - 40.0 * PER_MM == pytest.approx(more)
 
 
-def test_it_goes_no_faster_than_the_hot_end_melts() -> None:
+def test_priming_is_no_faster_than_the_hot_end_melts() -> None:
     profile: Profile = load(settings=["material.volumetric_limit_mm3_s=2"])
     strokes = _strokes((20.0,), speed=25.0)
     run_in(strokes, _layer(Kind.INFILL), 0.4, profile)

@@ -32,7 +32,7 @@ def printed(mesh: Mesh, profile: Profile) -> tuple[MachineProgram, Floats | None
 
 
 @pytest.mark.parametrize("machine", shipped("machine"))
-def test_every_shipped_machine_fills_its_nozzle_beside_the_print(machine: str) -> None:
+def test_every_shipped_machine_primes_its_nozzle_next_to_the_print(machine: str) -> None:
     profile = loaded(machine)
     program, lanes = printed(box(20, 20, 0.4), profile)
     assert lanes is not None
@@ -54,7 +54,7 @@ def test_the_line_keeps_clear_of_the_print_and_is_folded_or_left_out_where_there
             assert (np.abs(lanes[:, :2]).max(axis=1) > 0.5 * side_mm + 3.0).all()
 
 
-def test_no_line_is_printed_where_none_is_asked_for() -> None:
+def test_no_purge_line_is_printed_unless_requested() -> None:
     assert not has_purge(printed(box(20, 20, 0.4), loaded("generic_ac", "machine.purge_mm=0"))[0])
 
 
@@ -75,7 +75,7 @@ def test_the_line_is_written_in_the_words_of_the_firmware_once_the_nozzle_is_hot
     assert not any(line.startswith(("M104", "M568")) and line.endswith("215") for line in text[:hot])
 
 
-def test_the_line_may_lie_between_two_strokes_that_no_travel_is_printed_over() -> None:
+def test_the_purge_line_may_run_between_two_strokes_but_no_travel_crosses_it() -> None:
     profile = loaded("generic_ac")
     mesh, pose = box(20, 20, 0.4), level(profile.machine)
     part = Part(1, mesh, PLATFORM, pose, rotation(profile.machine, pose), mesh.volume_mm3, 0.0)

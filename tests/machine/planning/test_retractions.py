@@ -41,7 +41,7 @@ def _filament(program: MachineProgram) -> tuple[float, float]:
 
 
 @pytest.mark.parametrize("wipe", [0, 0.5, 2, 50])
-def test_what_is_pulled_back_is_pushed_forward_again(wipe: float) -> None:
+def test_retracted_filament_is_pushed_forward_again(wipe: float) -> None:
     pulled, pushed = _filament(_towers(f"material.wipe_mm={wipe}")[0])
     assert pulled > 10
     assert pulled == pytest.approx(pushed + 0.8)  # the print ends retracted
@@ -53,7 +53,7 @@ def test_extra_prime_is_pushed_after_every_retraction() -> None:
     assert pushed == pytest.approx(0.9 * count)
 
 
-def test_a_wipe_goes_over_the_path_just_printed_at_the_pace_of_the_filament() -> None:
+def test_a_wipe_follows_the_path_just_printed_at_the_retraction_speed() -> None:
     program, profile = _towers()
     wipes = [(a, b) for a, b in pairwise(moves_of(program)) if isinstance(b, Wipe)]
     assert all(isinstance(before, Stroke) for before, _ in wipes)
@@ -136,19 +136,19 @@ def _wiped(path: Path, before: np.ndarray) -> np.ndarray:
     return trail_after(laid, 0, 1, before, 2.0)
 
 
-def test_a_wipe_longer_than_its_stroke_goes_on_over_the_way_and_the_strokes_before_it() -> None:
+def test_a_wipe_longer_than_its_stroke_continues_over_the_travel_and_the_strokes_before_it() -> None:
     before = np.array([[9.0, 0.5, 0.2], [0.0, 0.5, 0.2]])
     way = _wiped(_short(0.15, ((10.0, 0.5),)), before)
     assert way == pytest.approx(np.array([[10.15, 0, 0.2], [10, 0, 0.2], [10, 0.5, 0.2], [9, 0.5, 0.2], [8.65, 0.5, 0.2]]))
 
 
-def test_a_wipe_goes_back_over_all_places_that_the_way_to_its_stroke_passed() -> None:
+def test_a_wipe_retraces_every_point_of_the_travel_to_its_stroke() -> None:
     way = _wiped(_short(0.15, ((9.4, 0.5), (10.0, 0.5))), np.array([[9.4, 0.9, 0.2], [0.0, 0.9, 0.2]]))
     places = [[10.15, 0], [10, 0], [10, 0.5], [9.4, 0.5], [9.4, 0.9], [9.05, 0.9]]
     assert way == pytest.approx(np.insert(places, 2, 0.2, axis=1))
 
 
-def test_a_wipe_never_goes_back_to_the_layer_below() -> None:
+def test_a_wipe_never_returns_to_the_layer_below() -> None:
     way = _wiped(_short(0.6), np.array([[9.0, 0.5, 0.0], [0.0, 0.5, 0.0]]))
     assert way[:, 0].min() == 10.0
     assert length_mm(way[:, :2]) == pytest.approx(2.0), "a lone short stroke is wiped to and fro"
@@ -158,7 +158,7 @@ def test_a_stroke_as_long_as_the_wipe_is_wiped_over_itself() -> None:
     assert len(_wiped(_short(5.0), np.array([[9.0, 0.5, 0.2], [0.0, 0.5, 0.2]]))) == 2
 
 
-def test_a_wipe_that_must_not_go_over_its_ring_goes_over_the_inner_wall_or_nowhere() -> None:
+def test_a_wipe_that_must_avoid_its_ring_follows_the_inner_wall_or_is_left_out() -> None:
     ring = np.array([[5, 0.9], [5, 0.3], [9, 0.3], [9, 9], [1, 9], [1, 0.3], [5, 0.3], [5, 0.6]], dtype=float)
     path = Path(Kind.OUTER_WALL, ring, 0.6, 20.0, 1.0, np.zeros((0, 2)), False, wiped=False)
     inner = np.array([[5, 0.9, 0.2], [8, 0.9, 0.2]])

@@ -103,7 +103,7 @@ def test_through_the_whole_turn_the_head_keeps_the_lift_from_table_cradle_and_pr
 
 
 @pytest.mark.parametrize("name", ["disc", "cradle"])
-def test_no_stand_of_the_family_is_quicker_and_safe_too(name: str) -> None:
+def test_no_candidate_position_is_both_faster_and_safe(name: str) -> None:
     machine, way = _machine(name), _route(name)
     quicker = []
     for x, y in list(stands(machine, _turn_of(machine)))[::4]:
@@ -126,7 +126,7 @@ def test_between_two_poses_that_are_tried_nothing_reaches_farther_than_is_reckon
     assert 0.0 <= nearest < 0.01  # mm
 
 
-def test_a_cradle_in_the_way_costs_time() -> None:
+def test_a_cradle_in_the_path_costs_time() -> None:
     assert _route("cradle").seconds >= _route("disc").seconds
 
 
@@ -135,7 +135,7 @@ def test_the_tip_crosses_above_the_next_part_with_clearance() -> None:
     assert way.across_z_mm >= TARGET[2] + _machine("disc").clearance_mm
 
 
-def test_a_machine_too_low_for_every_stand_says_how_high_it_would_need_to_be() -> None:
+def test_a_machine_too_low_for_every_position_reports_the_height_it_needs() -> None:
     machine = load().machine
     low = machine.model_copy(update={axis: machine.x.model_copy(update={"limits_mm": (-5.0, 5.0)}) for axis in "xy"})
     low = low.model_copy(update={"z": machine.z.model_copy(update={"limits_mm": (-80.0, 52.0)})})

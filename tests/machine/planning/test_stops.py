@@ -37,7 +37,7 @@ def test_the_print_stops_before_a_layer_in_the_words_of_the_firmware(dialect: st
     ]
 
 
-def test_the_tip_waits_above_all_that_stands_there_with_the_filament_pulled_back() -> None:
+def test_the_tip_waits_above_everything_printed_with_the_filament_retracted() -> None:
     lines = written("marlin", ["1:3"], [])
     findings = dry_run(lines, load()).findings
     assert [finding.code for finding in findings if finding.severity == "error"] == ["air"]  # the post is three layers high

@@ -124,7 +124,7 @@ def test_a_model_that_takes_too_long_is_a_row_and_is_tried_again_by_the_next_run
     assert main(command) == 0
 
 
-def test_after_ctrl_c_no_process_is_left_and_the_batch_goes_on(tmp_path: Path) -> None:
+def test_after_ctrl_c_no_process_remains_and_the_batch_can_continue(tmp_path: Path) -> None:
     folder, out = models(tmp_path / "models", a=shapes.box(), b=shapes.ball(30.0, 256)), tmp_path / "out"
     command = ["batch", str(folder), "-o", str(out), "--do", "estimate", "--workers", "1"]
     run = subprocess.Popen(
@@ -169,7 +169,7 @@ def test_two_models_of_one_name_do_not_write_over_each_other(tmp_path: Path) -> 
     assert (out / "tee.gcode").exists()
 
 
-def test_reasons_are_counted_whatever_models_and_numbers_they_name(tmp_path: Path) -> None:
+def test_reasons_are_counted_regardless_of_the_models_and_numbers_in_them(tmp_path: Path) -> None:
     rows = [
         Row("a.stl", REFUSED, sentence="a.stl is not closed: 188 open edges"),
         Row("b.stl", REFUSED, sentence="b.stl is not closed: 3 open edges"),
@@ -198,7 +198,7 @@ def test_reasons_are_counted_whatever_models_and_numbers_they_name(tmp_path: Pat
         (("models", "--workers", "0"), "--workers is '0': it must be at least 1; see tiltprint batch --help"),
     ],
 )
-def test_what_is_wrong_with_the_whole_batch_is_one_sentence_and_nothing_is_written(
+def test_an_error_of_the_whole_batch_is_one_line_and_nothing_is_written(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], words: tuple[str, ...], message: str
 ) -> None:
     monkeypatch.chdir(tmp_path)

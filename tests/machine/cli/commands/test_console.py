@@ -109,7 +109,7 @@ def test_heaters_are_switched_off_on_leaving_and_that_is_said(done: Done, capsys
     assert "switched off: nozzle set to 200 °C and bed set to 60 °C" in capsys.readouterr().err
 
 
-def test_heaters_stay_on_when_that_is_asked_for(done: Done, capsys: Capsys) -> None:
+def test_heaters_stay_on_when_requested(done: Done, capsys: Capsys) -> None:
     code, record = done("M104 S200\n", "--leave-heaters")
     assert (code, record.nozzle_target_c) == (0, 200.0)
     assert "left on: nozzle set to 200 °C" in capsys.readouterr().err
@@ -132,7 +132,7 @@ def test_temperature_reports_can_be_hidden(piped: Piped, capsys: Capsys, options
     assert COLD in out
 
 
-def test_the_error_of_a_printer_is_told_in_its_own_words(piped: Piped, capsys: Capsys) -> None:
+def test_a_printer_error_is_reported_in_its_own_words(piped: Piped, capsys: Capsys) -> None:
     with on_terminal(scripted(NAMED | {"M105": COLD, "G28": "Error:Homing failed, printer halted"})) as path:
         assert piped("G28\nG1 X1\n", path) == 1
     assert "Homing failed, printer halted" in capsys.readouterr().err.splitlines()[-1]
@@ -159,7 +159,7 @@ def test_a_senseless_option_is_one_sentence(piped: Piped, capsys: Capsys, option
     assert message.count("\n") == 1
 
 
-def test_a_person_types_gets_help_and_leaves_with_ctrl_d() -> None:
+def test_a_user_types_gets_help_and_exits_with_ctrl_d() -> None:
     with Person("console", "--port", "sim") as person:
         person.see(PROMPT)
         person.press("M114\n")
@@ -192,7 +192,7 @@ def test_a_line_that_comes_just_as_the_prompt_begins_is_written_by_the_prompt(ca
     assert early == ["", "ok\n"]
 
 
-def test_a_person_is_asked_about_heaters_that_are_on() -> None:
+def test_a_user_is_asked_about_heaters_that_are_on() -> None:
     with Person("console", "--port", "sim") as person:
         person.see(PROMPT)
         person.press("M104 S200\n")
@@ -225,7 +225,7 @@ def test_a_stop_is_obeyed_while_the_printer_heats() -> None:
         assert person.end() == 1
 
 
-def test_a_printer_that_goes_away_ends_the_console_without_a_key() -> None:
+def test_a_disconnected_printer_ends_the_console_without_a_key_press() -> None:
     with ExitStack() as stack:
         path = stack.enter_context(on_terminal(scripted(NAMED | {"M105": COLD})))
         with Person("console", "--port", path) as person:

@@ -27,13 +27,13 @@ def test_export_draws_the_layer_that_it_writes(tmp_path: Path, capsys: pytest.Ca
     assert "part 1, layer 3, z 0.9" in svg.read_text()
 
 
-def test_without_a_layer_the_first_one_is_drawn() -> None:
+def test_without_a_layer_option_the_first_layer_is_drawn() -> None:
     assert parse_layer(None, True) == (1, 1)
     assert parse_layer("12:345", True) == (12, 345)
 
 
 @pytest.mark.parametrize("layer", ["3", "a:b", "1:2:3", "-1:2", "1:", ""])
-def test_what_is_no_layer_is_refused(layer: str) -> None:
+def test_an_invalid_layer_is_refused(layer: str) -> None:
     with pytest.raises(OutputError, match="PART:LAYER is expected"):
         parse_layer(layer, True)
 
@@ -45,7 +45,7 @@ def test_a_part_or_layer_that_is_not_there_is_named() -> None:
         draw_layer(printed()[2], 2, 4)
 
 
-def test_a_file_in_the_way_that_cannot_be_read_is_refused_in_a_sentence(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_existing_unreadable_output_file_gives_a_one_line_error(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("box.gcode").write_text("G28\n")
 

@@ -59,9 +59,7 @@ def test_a_plan_that_is_not_there_yet_is_written_and_then_used(folder: Path) -> 
     assert len(_values("three.json")["parts"]) == 3
 
 
-def test_settings_of_a_part_are_kept_in_the_plan_and_change_what_is_written(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_part_settings_are_kept_in_the_plan_and_change_the_output(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("box.stl").write_bytes(stl(shapes.box()))
     Path("box.toml").write_text("version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 6\nprocess = {walls = 1}\n")
     _run("export", "box.stl", "--plan", "box.toml", "-o", "one.gcode")
@@ -124,7 +122,7 @@ def test_settings_that_no_modifier_may_have_are_refused(
     assert f"tiltprint: plan mine.toml: {sentence}" in capsys.readouterr().err
 
 
-def test_more_parts_than_there_are_give_all_there_are_and_say_so(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_requesting_more_parts_than_possible_gives_all_and_reports_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     _run("decompose", "tee.stl", "--parts", "50", "--json", "many.json")
     count = len(_values("many.json")["parts"])
@@ -167,7 +165,7 @@ def test_export_by_a_plan_gives_the_g_code_of_the_search_byte_by_byte(folder: Pa
     assert Path("planned.gcode").read_bytes() == Path("searched.gcode").read_bytes()
 
 
-def test_planes_by_hand_are_in_the_plan_with_their_zones(folder: Path) -> None:
+def test_manual_planes_are_saved_in_the_plan_with_their_zones(folder: Path) -> None:
     Path("tee.stl").write_bytes(stl(shapes.tee()))
     zone = "[[keep]]\nmin_mm = [-2.0, -2.0, 10.0]\nmax_mm = [2.0, 2.0, 11.0]\n"
     Path("mine.toml").write_text(f"version = 1\n{zone}")

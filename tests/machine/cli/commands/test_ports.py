@@ -41,7 +41,7 @@ def test_no_port_at_all_is_a_sentence_and_an_empty_list(here: list[SerialDevice]
     assert capsys.readouterr().out == "[]\n"
 
 
-def test_a_printer_is_told_with_firmware_axes_and_rate(here: list[SerialDevice], capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_printer_is_reported_with_firmware_axes_and_rate(here: list[SerialDevice], capsys: pytest.CaptureFixture[str]) -> None:
     with SimulatedPrinter(MACHINE) as printer:
         here.append(device(printer.path))
         assert main(["ports", "--baud", "250000"]) == 0
@@ -50,7 +50,7 @@ def test_a_printer_is_told_with_firmware_axes_and_rate(here: list[SerialDevice],
     assert line.endswith("axes X Y Z A C, at 250000 baud")
 
 
-def test_several_ports_are_asked_at_a_time_and_told_in_order(
+def test_several_ports_are_queried_at_once_and_reported_in_order(
     here: list[SerialDevice], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with (
@@ -68,19 +68,19 @@ def test_several_ports_are_asked_at_a_time_and_told_in_order(
     assert reports[3]["trouble"].startswith("port /dev/no-such-port does not exist")
 
 
-def test_an_impossible_rate_is_refused_before_any_port_is_asked(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_impossible_rate_is_refused_before_any_port_is_queried(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["ports", "--baud", "0"]) == 1
     assert capsys.readouterr().err.startswith("tiltprint: baud rate 0 is not possible")
 
 
-def test_without_asking_no_port_is_opened(here: list[SerialDevice], capsys: pytest.CaptureFixture[str]) -> None:
+def test_with_no_ask_no_port_is_opened(here: list[SerialDevice], capsys: pytest.CaptureFixture[str]) -> None:
     here.append(MEGA)
     assert main(["ports", "--no-ask"]) == 0
     lines = ["/dev/serial/by-id/usb-Mega", "    /dev/ttyACM0, Mega 2560 (2341:0042), serial number 7533"]
     assert capsys.readouterr() == ("\n".join(lines) + "\n", "")
 
 
-def test_a_port_in_use_is_told_without_its_name_twice() -> None:
+def test_a_busy_port_is_reported_without_repeating_its_name() -> None:
     with SimulatedPrinter(MACHINE) as printer:
         import serial
 
@@ -132,7 +132,7 @@ def test_a_running_simulator_is_a_port_as_long_as_it_runs(
     assert capsys.readouterr().out == "[]\n"
 
 
-def test_what_ends_a_simulator_is_not_lost_by_its_announcement(here: list[SerialDevice]) -> None:
+def test_an_error_in_a_simulator_is_not_hidden_by_its_announcement(here: list[SerialDevice]) -> None:
     with pytest.raises(BrokenPipeError), announced("simulated printer (mine)", "/dev/pts/9"):
         raise BrokenPipeError
 

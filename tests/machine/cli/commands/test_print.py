@@ -115,7 +115,7 @@ def test_a_dumb_terminal_gets_plain_lines_and_no_keys(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_without_a_terminal_plain_lines_tell_the_progress(hours: str) -> None:
+def test_without_a_terminal_progress_is_reported_in_plain_lines(hours: str) -> None:
     command = [sys.executable, "-c", HASTY, *print_of(hours)]
     process = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, cwd=ROOT)
     assert process.stderr is not None
@@ -126,7 +126,7 @@ def test_without_a_terminal_plain_lines_tell_the_progress(hours: str) -> None:
     assert re.fullmatch(r"printing: \d+ %, (part 1 of 1, layer 1, )?nozzle \d+ °C, bed \d+ °C, .* left\n", line.decode())
 
 
-def test_the_log_goes_where_it_is_asked_for(tmp_path: Path) -> None:
+def test_the_log_is_written_to_the_requested_path(tmp_path: Path) -> None:
     file, log = tmp_path / "short.gcode", tmp_path / "traffic.log"
     file.write_text("\n".join([*HEAT, *OFF]) + "\n")
     with SimulatedPrinter(MACHINE) as printer:
@@ -136,7 +136,7 @@ def test_the_log_goes_where_it_is_asked_for(tmp_path: Path) -> None:
     assert re.search(r"> N\d+ M109 S210\*\d+\n", text)
 
 
-def test_what_the_printer_did_not_understand_is_told_with_the_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_line_the_printer_rejected_is_reported_with_the_log_s_path(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, log = tmp_path / "odd.gcode", tmp_path / "traffic.log"
     file.write_text("\n".join([*HEAT, "M9876", *OFF]) + "\n")
     with SimulatedPrinter(MACHINE) as printer:

@@ -46,7 +46,7 @@ def refusal(capsys: pytest.CaptureFixture[str], out: Path, *words: object) -> st
 
 
 @pytest.mark.parametrize("name", ["generic_ac", "three_axis", "open5x_voron0", "gen5x"])
-def test_what_a_simulated_machine_tells_is_what_it_is(name: str, tmp_path: Path) -> None:
+def test_a_simulated_machine_is_detected_with_its_real_values(name: str, tmp_path: Path) -> None:
     real = load(name).machine
     with SimulatedPrinter(real) as printer:
         letters = ["--base", name] if real.turn.letter == "V" else []
@@ -59,7 +59,7 @@ def test_what_a_simulated_machine_tells_is_what_it_is(name: str, tmp_path: Path)
     assert machine.junction_speed_mm_s == real.junction_speed_mm_s
 
 
-def test_the_simulated_printer_is_asked_as_port_sim(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_simulated_printer_is_queried_with_port_sim(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     machine = detected(tmp_path / "my.toml", "--port", "sim")
     assert (tmp_path / "my.toml").read_text().startswith('inherits = "generic_ac"\n')
     assert machine.sources["machine.z.limits_mm"] == "Marlin bugfix-2.1.x (simulated): M211"
@@ -71,7 +71,7 @@ def test_the_simulated_printer_is_asked_as_port_sim(tmp_path: Path, capsys: pyte
     assert "tiltprint calibrate --machine" in table
 
 
-def test_nothing_moves_and_nothing_heats(tmp_path: Path) -> None:
+def test_detection_moves_and_heats_nothing(tmp_path: Path) -> None:
     with SimulatedPrinter(load().machine) as printer:
         detected(tmp_path / "my.toml", "--port", printer.path)
         record = printer.record
@@ -79,7 +79,7 @@ def test_nothing_moves_and_nothing_heats(tmp_path: Path) -> None:
     assert not any("nozzle" in event.text or "bed" in event.text for event in record.events)
 
 
-def test_a_profile_without_out_is_the_users_own(tmp_path: Path) -> None:
+def test_without_out_the_profile_is_saved_in_the_user_s_folder(tmp_path: Path) -> None:
     file = tmp_path / "workshop.log"
     file.write_text(LOG)
     assert main(["profiles", "detect", str(file)]) == 0
@@ -136,7 +136,7 @@ def test_linuxcncs_ini_and_grblhals_dump_find_their_bases(tmp_path: Path, capsys
     assert "over the shipped linuxcnc_xyzac" in out
 
 
-def test_a_port_that_speaks_grbl_is_asked_its_own_questions(tmp_path: Path) -> None:
+def test_a_grbl_port_is_queried_with_grbl_commands(tmp_path: Path) -> None:
     info, settings = DUMP[: DUMP.index("$11")], DUMP[DUMP.index("$11") : -4]
     with on_terminal(scripted({"$I": f"{info}ok", "$$": f"{settings}\nok"}, otherwise="error:20")) as port:
         assert detected(tmp_path / "my.toml", "--port", port).receive_bytes == 1024
@@ -163,7 +163,7 @@ class TellingDuet(DuetStandIn):
         return {"heat": heat, "move.extruders": [drive], "network": {"name": "cradle"}}.get(key, super()._model(key))
 
 
-def test_moonraker_and_a_duet_tell_over_the_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_moonraker_and_duet_report_their_settings_over_the_network(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, KEY)
     with stand_in("moonraker", handler=TellingKlipper) as (_, address):
         machine = detected(tmp_path / "k.toml", "--port", address)
@@ -174,7 +174,9 @@ def test_moonraker_and_a_duet_tell_over_the_network(tmp_path: Path, monkeypatch:
     assert (machine.nozzle_limit_c, machine.bed_limit_c) == (275.0, 100.0)
 
 
-def test_who_prints_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_printing_machine_is_left_alone(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv(VARIABLE, KEY)
     with stand_in("moonraker", handler=TellingKlipper) as (job, address):
         job.files["a.gcode"] = b"G28\n"
@@ -191,7 +193,7 @@ def test_who_prints_is_left_alone(tmp_path: Path, capsys: pytest.CaptureFixture[
         assert "is at work (error:8)" in refusal(capsys, tmp_path / "g.toml", "--port", port)
 
 
-def test_what_is_no_printer_is_one_sentence(
+def test_a_device_that_is_not_a_printer_gives_a_one_line_error(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(settings_queries, "ask_at_any_rate", partial(ask_at_any_rate, timeout_s=0.3))
@@ -201,7 +203,7 @@ def test_what_is_no_printer_is_one_sentence(
     assert "/dev/nowhere" in refusal(capsys, out, "--port", "/dev/nowhere")
 
 
-def test_who_does_not_tell_its_settings_here_is_one_sentence(
+def test_a_firmware_that_cannot_report_its_settings_gives_a_one_line_error(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(VARIABLE, KEY)

@@ -59,12 +59,12 @@ def test_material_and_process_are_written_and_read_back(tmp_path: Path) -> None:
     assert material.nozzle_c == 207.0  # type: ignore[attr-defined]
 
 
-def test_what_has_no_name_is_called_as_its_file(tmp_path: Path) -> None:
+def test_an_unnamed_profile_is_named_after_its_file(tmp_path: Path) -> None:
     import_profiles(replace(request(tmp_path), name=""))
     assert sorted(file.name for file in tmp_path.glob("*.toml")) == ["config-material.toml", "config-process.toml"]
 
 
-def test_what_became_of_every_setting_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_outcome_of_every_setting_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     import_profiles(request(tmp_path, json=True))
     told = json.loads(capsys.readouterr().out)
     settings = {row["theirs"] for profile in told["profiles"] for row in profile["settings"]}
@@ -84,7 +84,7 @@ def test_a_file_that_is_not_there_is_one_sentence(capsys: pytest.CaptureFixture[
     assert "profile nowhere.ini cannot be read (no such file or directory)" in capsys.readouterr().err
 
 
-def test_settings_whose_values_cannot_be_taken_are_no_strangers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_settings_with_unusable_values_are_not_reported_as_unknown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "odd.ini").write_text("perimeters = many\nlayer_height = none\n")
     assert main(["profiles", "import", str(tmp_path / "odd.ini")]) == 1
     said = capsys.readouterr().err
@@ -95,7 +95,7 @@ def test_settings_whose_values_cannot_be_taken_are_no_strangers(tmp_path: Path, 
     (("-o", "config.ini"), "output config.ini is a file: a folder is expected"),
     (("--process-preset", "FINE"), "--process-preset FINE: odd.ini is not a bundle with presets to choose from"),
 ])  # fmt: skip
-def test_a_wrong_option_is_told_before_settings_that_cannot_be_taken(
+def test_an_invalid_option_is_reported_before_unusable_settings(
     options: tuple[str, ...], sentence: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

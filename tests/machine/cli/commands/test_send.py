@@ -43,7 +43,7 @@ def sent(*words: object) -> int:
     return main(["send", *map(str, words)])
 
 
-def test_a_file_is_sent_and_started_where_that_is_asked_for(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_a_file_is_uploaded_and_started_on_request(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     with stand_in("octoprint") as (job, address):
         assert sent(MARLIN, "--to", address, "--force") == 0
         assert job.files["post_and_arm_generic_ac.gcode"].decode().splitlines() == MARLIN.read_text().splitlines()
@@ -104,7 +104,7 @@ STEPPERS = ("stepper_a", "stepper_b")
     ("octoprint", {}, (MARLIN, "--set", "machine.tilt.point_mm=[0, 0, -33]"),
      "was made when machine.tilt.point_mm of generic A/C table was"),
 ])  # fmt: skip
-def test_what_does_not_fit_is_refused_before_a_byte_is_sent(
+def test_an_unsuitable_file_is_refused_before_any_byte_is_sent(
     kind: str,
     more: dict[str, Any],
     words: tuple[object, ...],
@@ -123,7 +123,7 @@ def test_what_does_not_fit_is_refused_before_a_byte_is_sent(
     assert job.files == {}
 
 
-def test_a_server_that_prints_is_told_of_before_any_work(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_busy_server_is_reported_before_any_work(capsys: pytest.CaptureFixture[str]) -> None:
     with stand_in("octoprint") as (job, address):
         job.files["other.gcode"] = b"G28\n" * 100_000
         job.start("other.gcode")
@@ -143,14 +143,16 @@ def test_a_server_that_prints_is_told_of_before_any_work(capsys: pytest.CaptureF
         (["send", str(MARLIN), "--to", "octoprint:octopi", "--log", str(MARLIN)], "is the same file as the model, which is read"),
     ],
 )
-def test_what_cannot_be_sent_is_one_sentence(words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_that_cannot_be_sent_gives_a_one_line_error(
+    words: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(words) == 1
     said = capsys.readouterr().err
     assert sentence in said
     assert said.count("\n") == 1
 
 
-def test_an_interrupted_upload_is_told_of(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_interrupted_upload_is_reported(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     def interrupted(*_: object) -> str:
         raise KeyboardInterrupt
 
@@ -188,7 +190,7 @@ def test_a_print_on_a_server_is_paused_by_a_key_and_cancelled_by_the_second_ctrl
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("interrupts", "state"), [(1, "printing"), (2, "cancelled")])
-def test_without_a_terminal_one_interrupt_leaves_and_two_cancel(interrupts: int, state: str) -> None:
+def test_without_a_terminal_one_interrupt_detaches_and_two_cancel(interrupts: int, state: str) -> None:
     with stand_in("octoprint") as (job, address):
         job.steps = 10_000
         command = [sys.executable, "-c", HASTY, *print_of(address)]
@@ -225,7 +227,7 @@ def scene(folder: Path) -> Scene:
 
 
 @pytest.mark.parametrize(("gone", "rest"), [(0, "keeps nothing of"), (7, "may hold all of")])
-def test_an_upload_that_is_broken_off_tells_what_the_server_has(
+def test_an_aborted_upload_reports_what_the_server_kept(
     gone: int, rest: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     class Interrupted:
@@ -244,7 +246,7 @@ def test_an_upload_that_is_broken_off_tells_what_the_server_has(
     assert f"upload broken off: octoprint:host {rest} a.gcode" in capsys.readouterr().err
 
 
-def test_a_person_who_gives_up_breaks_the_upload_off(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_cancelling_at_the_terminal_aborts_the_upload(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     class GivingUp(AtTerminal):
         def cancels(self) -> bool:
             return True

@@ -85,7 +85,9 @@ def test_faults_of_a_file_happen(tmp_path: Path) -> None:
     (["--habits", "melt"], "--habits holds 'melt': advanced-ok, emergency-parser,"),
     (["--machine", "linuxcnc_xyzac"], "takes no lines: marlin, reprapfirmware, klipper"),
 ])  # fmt: skip
-def test_what_cannot_be_is_refused_with_a_sentence(options: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_impossible_option_is_refused_with_a_one_line_error(
+    options: list[str], words: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main(["simulator", *options]) == 1
     errors = capsys.readouterr().err
     assert words in errors
@@ -98,7 +100,7 @@ def test_a_ball_on_its_plate_is_probed() -> None:
     assert b" Z:55.0" in answer or b" Z:54.9" in answer
 
 
-def test_a_file_in_the_way_of_the_link_stays(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_at_the_link_s_path_is_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "mine").write_text("x")
     (tmp_path / "link").symlink_to(tmp_path / "mine")
     for name in ("mine", "link"):
@@ -107,7 +109,7 @@ def test_a_file_in_the_way_of_the_link_stays(tmp_path: Path, capsys: pytest.Capt
     assert (tmp_path / "link").read_text() == "x"
 
 
-def test_habits_are_told_by_words() -> None:
+def test_build_options_are_parsed_from_words() -> None:
     assert read_build_options("", BuildOptions()) == BuildOptions()
     assert read_build_options("no-advanced-ok, realtime,rx-ring=64", BuildOptions()) == BuildOptions(
         advanced_ok=False, realtime=True, rx_ring=64

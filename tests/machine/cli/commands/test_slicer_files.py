@@ -66,7 +66,7 @@ def beside(x_mm: float, plate: int) -> Placed:
     return Placed(np.vstack([np.eye(3), [x_mm, 0.0, 0.0]]), plate)
 
 
-def test_the_plate_that_is_asked_for_is_printed() -> None:
+def test_the_requested_plate_is_printed() -> None:
     objects = [Object([Made(POST)], [beside(0.0, 1)]), Object([Made(TEE)], [beside(300.0, 2)])]
     bambu(Path("two.3mf"), objects, np.random.default_rng(0))
     first, second = export("two.3mf"), export("two.3mf", "--plate", "2")
@@ -127,7 +127,7 @@ def test_a_profile_named_by_an_option_replaces_the_one_inside_the_file(capsys: p
 
 
 @pytest.mark.parametrize("kind", ["PrusaSlicer", "OrcaSlicer", "Cura"])
-def test_a_project_is_printed_by_its_own_settings_where_asked(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_project_is_printed_with_its_own_settings_on_request(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     files.threemf(Path("a.3mf"), {1: files.threemf_mesh(from_manifold(POST))}, '<item objectid="1"/>', parts=settings_of(kind))
     config = read_config(Path("a.3mf"))
     assert (config.program, config.number("perimeters"), config.number("temperature")) == (kind, 4.0, 231.0)
@@ -142,7 +142,7 @@ def test_a_project_is_printed_by_its_own_settings_where_asked(kind: str, capsys:
     assert f"a.3mf: uses the settings of {kind} inside: " in capsys.readouterr().err
 
 
-def test_what_keeps_no_settings_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_file_without_settings_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     prusaslicer(Path("a.3mf"), [Object([Made(POST)], [AT_ORIGIN])])
     damaged = prusaslicer(Path("b.3mf"), [Object([Made(POST)], [AT_ORIGIN])], {"Metadata/project_settings.config": "{"})
     Path("a.stl").write_bytes(stl(from_manifold(POST)))

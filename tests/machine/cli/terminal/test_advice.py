@@ -17,7 +17,7 @@ WHOLE = FrontRow((), 300.0, 0.0, 425.4, stairs_mm2=125.4, time_s=3723.0, filamen
 CUT = FrontRow(PLANES, 30.0, 80.0, 78.0, stairs_mm2=6.0, time_s=3600.0, filament_mm=3900.0)
 
 
-def test_what_was_chosen_is_advised() -> None:
+def test_the_chosen_row_is_recommended() -> None:
     decomposition = replace(tee_in_parts(), front=(WHOLE, replace(CUT, chosen=True, reason="for the lowest cost")))
     assert advice(decomposition, PROFILE).splitlines() == [
         "print it      needs support mm²    less  seams mm  stair-stepping mm²  cost mm²   time  filament m",
@@ -27,7 +27,7 @@ def test_what_was_chosen_is_advised() -> None:
     ]
 
 
-def test_whoever_asked_for_other_parts_is_told_which_cost_less() -> None:
+def test_a_user_who_requested_other_parts_is_advised_which_cost_less() -> None:
     decomposition = replace(alone(tee(), 300.0), front=(replace(WHOLE, chosen=True, reason="by you"), CUT))
     assert advice(decomposition, PROFILE).splitlines()[-1] == "best: print it in 3 parts: --parts 3"
 

@@ -48,7 +48,7 @@ def test_the_pose_is_that_of_the_acknowledged_line() -> None:
     assert lines(turned)[1] == "part 2 of 2   tilt A 30.0 deg   turn C 120.0 deg"
 
 
-def test_what_is_not_known_is_left_out() -> None:
+def test_unknown_values_are_omitted() -> None:
     unknown = PrintStatus(elapsed_s=0.0)
     _, position, heat, bar, times, _ = lines(unknown)
     assert (position, heat, times) == ("starting", "feed 100 %   flow 100 %", "0s so far")
@@ -65,16 +65,16 @@ def test_temperatures_that_may_be_true_no_more_are_marked_with_their_age(old: di
         assert not any("as last known" in line for line in (*lines(fresh), status_line(fresh)))
 
 
-def test_an_end_on_another_day_is_told_with_its_day() -> None:
+def test_an_end_time_on_another_day_includes_the_day() -> None:
     assert "done at Sun 22 Nov 04:00" in lines(replace(MOMENT, left_s=16 * 3600.0))[4]
 
 
-def test_the_printer_s_words_stand_below_and_a_question_replaces_the_keys() -> None:
+def test_the_printer_s_messages_are_at_the_bottom_and_a_question_replaces_the_keys() -> None:
     drawn_lines = lines(MOMENT, ("echo one", "two"), "cancel?")
     assert drawn_lines[5:] == ["  echo one", "  two", "cancel?"]
 
 
-def test_a_warning_stands_above_the_printer_s_words() -> None:
+def test_a_warning_is_above_the_printer_s_messages() -> None:
     shown = lines(replace(MOMENT, warning="this print can no longer be resumed"), ("hello",))
     assert [line.strip() for line in shown[5:7]] == ["this print can no longer be resumed", "hello"]
 

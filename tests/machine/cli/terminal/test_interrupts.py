@@ -28,7 +28,7 @@ def wait_for_nothing() -> None:
         os.close(end)
 
 
-def test_an_interrupt_that_ends_no_waiting_is_heard_all_the_same() -> None:
+def test_an_interrupt_that_does_not_end_a_wait_is_still_handled() -> None:
     # A signal that arrives in another thread does not end this thread's select(), like one just before select().
     elsewhere = threading.Timer(0.2, lambda: signal.pthread_kill(threading.get_ident(), signal.SIGINT))
     late: list[str] = []
@@ -41,7 +41,7 @@ def test_an_interrupt_that_ends_no_waiting_is_heard_all_the_same() -> None:
     assert not late
 
 
-def test_waiting_goes_on_after_signals_that_are_none_of_its_own() -> None:
+def test_waiting_continues_after_unrelated_signals() -> None:
     noted: list[int] = []
     before = signal.signal(signal.SIGUSR1, lambda number, frame: noted.append(number))
     with interrupting():
@@ -52,7 +52,7 @@ def test_waiting_goes_on_after_signals_that_are_none_of_its_own() -> None:
     assert noted == [signal.SIGUSR1] * 3
 
 
-def test_what_must_not_be_left_is_told_of_an_interrupt_and_goes_on() -> None:
+def test_uninterruptible_work_is_notified_of_an_interrupt_and_continues() -> None:
     calls: list[str] = []
     with interrupting():
         with calling(lambda: calls.append("interrupted")):
@@ -156,7 +156,7 @@ def test_work_that_ends_by_itself_is_not_ended_again(capfd: pytest.CaptureFixtur
     assert (threading.active_count(), capfd.readouterr().err) == (threads, "")
 
 
-def test_the_process_ends_although_nobody_reads_its_last_words(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_process_exits_even_if_stderr_is_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     class Gone(io.StringIO):
         def write(self, text: str) -> int:
             raise BrokenPipeError

@@ -54,12 +54,12 @@ def test_other_keys_and_an_unsure_cancel_ask_for_nothing(keys: str) -> None:
 
 
 @pytest.mark.parametrize("keys", ["cc", "cy", "CY"])
-def test_cancelling_is_asked_once_more(keys: str) -> None:
+def test_cancelling_asks_for_confirmation(keys: str) -> None:
     assert hint_after(keys[0]) == SURE
     assert asked(*keys) == [PendingCommand(Command.CANCEL)]
 
 
-def test_a_question_that_nobody_answers_is_void_after_a_while() -> None:
+def test_an_unanswered_question_expires() -> None:
     control, clock = Control(), [0.0]
     board = Keyboard(control, now_s=lambda: clock[0])
     board.press("c")
@@ -80,7 +80,7 @@ def test_an_expired_question_whether_to_leave_does_not_change_the_answers_to_the
     assert (control.take(), board.left()) == (PendingCommand(Command.CANCEL), False)
 
 
-def test_the_question_goes_away_with_the_answer() -> None:
+def test_the_question_disappears_when_answered() -> None:
     assert hint_after("c", "n") == ""
 
 
@@ -106,7 +106,7 @@ def test_q_is_explained() -> None:
 @pytest.mark.parametrize(("keys", "percent"), [
     ("+", [110.0]), ("++", [110.0, 120.0]), ("=", [110.0]), ("-", [90.0]), ("+-", [110.0, 100.0]), ("_", [90.0]),
 ])  # fmt: skip
-def test_the_feed_goes_in_steps(keys: str, percent: list[float]) -> None:
+def test_the_feed_changes_in_steps(keys: str, percent: list[float]) -> None:
     assert asked(*keys) == [PendingCommand(Command.FEED, value) for value in percent]
 
 
@@ -158,7 +158,7 @@ def keyboard(monkeypatch: pytest.MonkeyPatch) -> Iterator[int]:
     os.close(fingers)
 
 
-def test_keys_come_as_they_are_pressed_and_arrows_are_none(keyboard: int) -> None:
+def test_keys_are_read_as_they_are_pressed_and_escape_sequences_are_ignored(keyboard: int) -> None:
     pressed = Pressed()
     with typing(pressed):
         os.write(keyboard, b"p")
@@ -190,7 +190,7 @@ def _interrupted() -> None:
         raise KeyboardInterrupt
 
 
-def test_the_terminal_is_as_before_on_every_way_out(keyboard: int) -> None:
+def test_the_terminal_is_restored_after_an_interrupt(keyboard: int) -> None:
     before = termios.tcgetattr(sys.stdin.fileno())
     with pytest.raises(KeyboardInterrupt):
         _interrupted()
@@ -204,7 +204,7 @@ def test_no_thread_is_left(keyboard: int) -> None:
     assert set(threading.enumerate()) <= before
 
 
-def test_a_terminal_that_goes_away_ends_the_reading_of_keys_and_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_closed_terminal_ends_the_key_reader_without_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
     fingers, terminal = pty.openpty()
     with os.fdopen(terminal, "r") as stdin:
         monkeypatch.setattr(sys, "stdin", stdin)
@@ -228,7 +228,7 @@ class Console:
         return self._typed.pop(0)
 
 
-def test_where_there_is_no_termios_keys_come_from_the_windows_console(monkeypatch: pytest.MonkeyPatch, keyboard: int) -> None:
+def test_without_termios_keys_are_read_from_the_windows_console(monkeypatch: pytest.MonkeyPatch, keyboard: int) -> None:
     monkeypatch.setitem(sys.modules, "msvcrt", Console("p\xe0Kr\x00;+"))
     monkeypatch.setitem(sys.modules, "termios", None)
     pressed = Pressed()
@@ -237,7 +237,7 @@ def test_where_there_is_no_termios_keys_come_from_the_windows_console(monkeypatc
         assert pressed.wait_for(3) == "pr+"
 
 
-def test_where_keys_cannot_be_read_none_are_offered(monkeypatch: pytest.MonkeyPatch, keyboard: int) -> None:
+def test_if_keys_cannot_be_read_none_are_offered(monkeypatch: pytest.MonkeyPatch, keyboard: int) -> None:
     monkeypatch.setitem(sys.modules, "termios", None)
     assert not can_type()
 
@@ -280,7 +280,7 @@ def commands_of(control: Control) -> list[Command]:
         ("l", [], False),
     ],
 )
-def test_keys_mean_what_they_mean_at_a_port_and_l_leaves_when_asked(
+def test_keys_work_as_at_a_port_and_l_leaves_when_asked(
     keys: str, commands: list[Command], left: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     board, control, _ = board_and_control(monkeypatch)
@@ -300,7 +300,7 @@ def test_the_first_ctrl_c_asks_the_second_cancels_the_third_ends_at_once(monkeyp
         board.interrupt()
 
 
-def test_any_key_after_ctrl_c_goes_on_following(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_any_key_after_ctrl_c_continues_following(monkeypatch: pytest.MonkeyPatch) -> None:
     board, control, clock = board_and_control(monkeypatch)
     board.interrupt()
     board.press("x")
@@ -311,7 +311,7 @@ def test_any_key_after_ctrl_c_goes_on_following(monkeypatch: pytest.MonkeyPatch)
     assert commands_of(control) == []
 
 
-def test_a_question_that_nobody_answers_leaves_the_print_going_on(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unanswered_question_leaves_the_print_running(monkeypatch: pytest.MonkeyPatch) -> None:
     board, control, clock = board_and_control(monkeypatch)
     board.interrupt()
     clock.now_s = 9.9
@@ -321,7 +321,7 @@ def test_a_question_that_nobody_answers_leaves_the_print_going_on(monkeypatch: p
     assert commands_of(control) == []
 
 
-def test_without_a_terminal_the_way_to_cancel_is_said(
+def test_without_a_terminal_the_output_explains_how_to_cancel(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     board, control, clock = board_and_control(monkeypatch, terminal=False)

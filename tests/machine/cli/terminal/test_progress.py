@@ -28,7 +28,7 @@ def test_a_log_hears_of_what_changes_every_five_seconds_and_of_what_does_not_onc
     assert capsys.readouterr().err == "a\nb\nb\n"
 
 
-def test_on_a_terminal_the_work_under_way_is_one_live_line_that_goes_away(tmp_path: Path) -> None:
+def test_on_a_terminal_the_current_work_is_one_live_line_that_disappears(tmp_path: Path) -> None:
     (tmp_path / "tee.stl").write_bytes(stl(tee()))
     with Person("decompose", str(tmp_path / "tee.stl"), *QUICK, "--set=search.directions=200", "--as-is") as person:
         person.see("searching parts: stage")

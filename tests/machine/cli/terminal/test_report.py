@@ -34,7 +34,7 @@ def tee_in_parts() -> Decomposition:
     return Decomposition("tee.stl", tee(), parts, 2, "classic", 300.0, 30.0, 1234, 2, 0.25)
 
 
-def test_the_parts_of_a_tee_stand_in_print_order_with_what_they_save() -> None:
+def test_the_parts_of_a_tee_are_listed_in_print_order_with_their_savings() -> None:
     lines = parts_table(tee_in_parts()).splitlines()
     assert lines == [
         "part  tilt deg  turn deg  base mm  volume mm³   share  needs support mm²  uncut",
@@ -46,7 +46,7 @@ def test_the_parts_of_a_tee_stand_in_print_order_with_what_they_save() -> None:
     assert "1234 candidates in 0.2 s" in parts_table(tee_in_parts(), verbose=True)
 
 
-def test_the_front_stands_below_the_parts_with_the_row_taken_and_why() -> None:
+def test_the_front_is_listed_below_the_parts_with_the_chosen_row_and_the_reason() -> None:
     planes = (Plane(np.array([1.0, 0.0, 0.0]), 5.0), Plane(np.array([-1.0, 0.0, 0.0]), 5.0))
     rows = (
         FrontRow((), 300.0, 0.0, 312.0, stairs_mm2=12.4, time_s=3723.0, filament_mm=4040.0),
@@ -72,7 +72,7 @@ def test_the_front_shows_the_totals_if_they_decided() -> None:
     ]
 
 
-def test_the_joints_stand_in_print_order_and_the_weakest_is_named() -> None:
+def test_the_joints_are_listed_in_print_order_and_the_weakest_is_named() -> None:
     joints = (Joint(2, 70.18, 21.16, 36.585, 842.19, 31.2), Joint(3, 111.33, 29.13, 19.529, 12605.3, 40.0))
     assert joints_table(joints).splitlines() == [
         "joint of part  area mm²  seam mm  arm mm  breaks at N  pulled off at N",
@@ -94,7 +94,7 @@ def test_a_joint_that_is_sliced_has_its_contact_and_its_plastic_one_that_is_not_
     ]
 
 
-def test_pins_are_counted_part_by_part_and_none_are_not_told() -> None:
+def test_pins_are_counted_per_part_and_omitted_if_none() -> None:
     sliced = [SlicedPart(index, (), pins=pins) for index, pins in ((1, 0), (2, 8), (3, 0), (4, 5))]
     assert pins_line(sliced) == "pins: part 2 8, part 4 5\n"
     assert pins_line(sliced[:1]) == ""
@@ -115,12 +115,12 @@ def test_the_areas_follow_the_self_supporting_angle() -> None:
     assert before == [pytest.approx(400 + 100, abs=0.2), pytest.approx(100, abs=0.2)]
 
 
-def test_the_authors_terms_count_what_stands_on_the_platform() -> None:
+def test_the_paper_s_metric_counts_faces_on_the_build_plate() -> None:
     lines = parts_table(tee_in_parts(), count_platform_faces=True).splitlines()
     assert lines[1].split()[-1] == "100.0"
 
 
-def test_a_rotation_is_told_as_the_setting_takes_it() -> None:
+def test_a_rotation_is_reported_in_the_form_of_its_setting() -> None:
     upside_down = tee().transform(np.diag([1.0, -1.0, -1.0]))
     assert in_words(best_orientation(upside_down, 45.0)) == "as it stands"
     oblique = tee().transform(about(np.array([0.0, 1.0, 0.0]), np.radians(30)))
@@ -135,7 +135,7 @@ def run_lines(moves: str) -> list[str]:
     return run_table(dry_run(lines, profile.model_copy(update={"machine": machine}))).splitlines()
 
 
-def test_a_run_is_told_in_four_lines_and_its_findings() -> None:
+def test_a_run_is_reported_in_four_lines_and_its_findings() -> None:
     assert run_lines(";PART:1 of 1\n;LAYER_CHANGE\nG0 Z10 F600\nG1 X30 E1\nG1 E-1\nM777") == [
         "time 4s, filament 0.00 m, 0.00 cm³",
         "1 part, 1 layer, 0 reorientations, 1 retraction, 0.01 m travel",
@@ -146,7 +146,7 @@ def test_a_run_is_told_in_four_lines_and_its_findings() -> None:
     ]
 
 
-def test_a_long_finding_is_told_in_lines_with_every_key_whole() -> None:
+def test_a_long_finding_is_wrapped_without_splitting_a_key() -> None:
     machine = load_one("trident_5axis")["machine"]
     lines = run_table(dry_run(["M105"], load(machine="trident_5axis"))).splitlines()
     first = next(k for k, line in enumerate(lines) if "Voron Trident 5-axis is not calibrated: 8 values are guesses" in line)
@@ -154,7 +154,7 @@ def test_a_long_finding_is_told_in_lines_with_every_key_whole() -> None:
     assert set(machine.uncalibrated) <= set(" ".join(lines[first:]).replace(",", "").split())
 
 
-def test_a_program_without_a_move_says_so() -> None:
+def test_a_program_without_a_move_is_reported() -> None:
     assert run_lines("")[2] == "nothing moves"
 
 
@@ -162,7 +162,7 @@ def test_a_table_aligns_words_left_and_numbers_right() -> None:
     assert table([["part", "mm"], ["1", "10.5"]]) == "part    mm\n1     10.5\n"
 
 
-def test_the_plastic_of_every_interface_is_told_and_of_one_piece_none() -> None:
+def test_the_plastic_of_every_interface_is_reported_and_omitted_for_one_piece() -> None:
     line = interfaces_line({2: 174.0, 3: 301.0})
     assert line == "interfaces take 0.47 cm³ that one piece would not: part 2 0.17, part 3 0.30\n"
     assert interfaces_line({}) == ""

@@ -101,14 +101,14 @@ class TestFirmwares:
         parsed = read("G93\nG1 X30 A90 F2\nG94\nG1 X0 F600\nG0 X30", "linuxcnc")
         assert parsed.feed.tolist() == [60.0, 600.0, 18000.0]
 
-    def test_klipper_s_feed_of_a_pure_turn_is_that_of_the_axis_that_goes_farthest(self) -> None:
+    def test_klipper_s_feed_of_a_pure_turn_is_that_of_the_axis_that_moves_farthest(self) -> None:
         assert read("G1 A30 C40 F600", "klipper").feed.tolist() == [750.0]
         assert read("G1 A30 C40 F600").feed.tolist() == [600.0]
 
     def test_a_comment_in_parentheses_may_hold_a_semicolon(self) -> None:
         assert ends("G1 X1 (left; not right) Y2 ; (done") == [[1, 2, 0, 0, 0, 0]]
 
-    def test_nothing_after_the_end_of_a_cnc_program_moves(self) -> None:
+    def test_moves_after_the_end_of_a_cnc_program_are_ignored(self) -> None:
         assert len(read("G1 X1 F60\nM2\nG1 X2", "linuxcnc").line) == 1
 
     def test_steppers_that_are_not_waited_for_turn_with_the_next(self) -> None:
@@ -135,7 +135,7 @@ class TestFirmwares:
         ("G18", "linuxcnc", "line 2: G18 is not supported"),
     ],
 )
-def test_what_a_firmware_does_not_know_is_refused_with_its_line(line: str, dialect: str, message: str) -> None:
+def test_a_command_unknown_to_the_firmware_is_refused_with_its_line_number(line: str, dialect: str, message: str) -> None:
     with pytest.raises(GcodeError, match=message):
         read(f"G21\n{line}", dialect)
 
@@ -171,7 +171,9 @@ def test_any_scraps_are_read_or_refused_with_a_line(lines: list[str], machine: M
 
 @settings(max_examples=60, deadline=None)
 @given(st.sampled_from(list(dialects())), st.integers(0, 5000), st.binary(min_size=1, max_size=3), st.booleans())
-def test_our_own_text_with_a_few_bytes_changed_never_crashes(dialect: str, begin: int, rubbish: bytes, insert: bool) -> None:
+def test_generated_gcode_with_a_few_bytes_changed_never_crashes_the_reader(
+    dialect: str, begin: int, rubbish: bytes, insert: bool
+) -> None:
     chosen, lines, _ = both(dialect, "table")
     text = "\n".join(lines[:200])
     begin %= len(text)
@@ -191,7 +193,7 @@ def test_a_comment_of_a_megabyte_is_no_matter() -> None:
     assert ends("G1 X1 ;" + "(" * 1_000_000)[0][0] == 1.0
 
 
-def test_strokes_of_a_hand_edited_followed_program_are_where_its_author_put_them() -> None:
+def test_strokes_of_a_hand_edited_program_in_workpiece_coordinates_keep_their_positions() -> None:
     parsed = read("M428\nG1 X10 Y0 Z5 F600\nG1 A90 C0 U0\nG1 X11 U1\nM429", "linuxcnc", "workpiece")
     stroke = np.flatnonzero(parsed.kind == MoveKind.EXTRUDE)[0]
     assert parsed.end[stroke, 0] - parsed.start[stroke, 0] == pytest.approx(1.0, abs=1e-9)
@@ -199,7 +201,7 @@ def test_strokes_of_a_hand_edited_followed_program_are_where_its_author_put_them
 
 
 @pytest.mark.parametrize(("start", "end"), [("PRINT_START BED=60 EXTRUDER=210", "PRINT_END"), ('M98 P"start.g"', 'M98 P"end.g"')])
-def test_a_macro_of_the_machine_s_own_may_home_and_heat_unseen(start: str, end: str) -> None:
+def test_a_custom_macro_may_home_and_heat_invisibly(start: str, end: str) -> None:
     klipper = load("three_axis", settings=["machine.dialect=klipper"])
     print_ = ["M104 S210", "G1 Z0.2 F600", "G1 X50 Y50", "M83", "G1 X90 E1"]
 

@@ -39,7 +39,7 @@ def test_homing_puts_only_the_named_axes_at_home() -> None:
     assert [(event.code, event.letters, event.row) for event in parsed.events] == [("G28", "XY", 1)]
 
 
-def test_kinds_of_moves_are_told_apart() -> None:
+def test_move_kinds_are_distinguished() -> None:
     kinds = _read("M83\nG0 X1\nG1 X2 E1\nG1 E-1\nG1 E1\nG0 A30 C10\nG0 F200").kind
     assert kinds.tolist() == [MoveKind.TRAVEL, MoveKind.EXTRUDE, MoveKind.RETRACT, MoveKind.RETRACT, MoveKind.ROTATE]
 
@@ -104,7 +104,7 @@ def test_parts_layers_and_types_come_from_the_comments() -> None:
         ("T1", "line 2: T1 is not supported"),
     ],
 )
-def test_what_cannot_be_read_is_refused_with_its_line(line: str, message: str | None) -> None:
+def test_an_unreadable_line_is_refused_with_its_line_number(line: str, message: str | None) -> None:
     if message is None:
         assert "HELLO" in _read(f"G21\n{line}").ignored
         return

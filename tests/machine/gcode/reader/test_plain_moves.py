@@ -66,13 +66,13 @@ def test_every_dialect_reads_g0_as_fast_as_it_does(machine: str) -> None:
         ("G1 X--1", "line 3: 'G1 X--1' cannot be read as G-code"),
     ],
 )
-def test_a_wrong_line_among_plain_moves_is_told_by_its_number(line: str, sentence: str) -> None:
+def test_an_invalid_line_among_plain_moves_is_reported_with_its_line_number(line: str, sentence: str) -> None:
     with pytest.raises(GcodeError) as error:
         parse_gcode(["G1 X1 F600", "G1 X2", line, "G1 X3"], MACHINE)
     assert str(error.value) == sentence
 
 
-def test_lines_with_line_ends_and_foreign_letters_are_read_alike() -> None:
+def test_lines_with_line_endings_and_non_ascii_letters_are_read_the_same() -> None:
     lines = ["G1 X1 F600", "; größer", "G1 X2.5 E0.1", "M117 é", "G1 Y1"]
     assert_same(parse_gcode(lines, MACHINE), parse_gcode([f"{line}\r\n" for line in lines], MACHINE))
 
@@ -84,14 +84,14 @@ def test_a_long_run_has_a_row_a_line() -> None:
     assert program.end[-1, 0] == 9999 % 7 + 0.9
 
 
-def test_more_kinds_of_line_than_a_run_knows_are_read_alike() -> None:
+def test_more_line_types_than_one_batch_holds_are_read_the_same() -> None:
     lines = [line for k in (*range(100), *range(100)) for line in (f";TYPE:kind {k}", f"G1 X{k} E1")]
     program = parse_gcode(lines, MACHINE)
     assert [program.types[kind] for kind in program.type] == [f"kind {k}" for k in (*range(100), *range(100))]
     assert_same(program, parse_gcode(in_turn(lines), MACHINE))
 
 
-def test_more_remarks_than_there_was_room_for_are_read_alike() -> None:
+def test_more_comments_than_the_buffer_holds_are_read_the_same() -> None:
     lines = [line for k in range(3000) for line in (f";WIDTH:{k / 1000}", f"G1 X{k} E1")]
     program = parse_gcode(lines, MACHINE)
     assert program.width_mm.tolist() == [k / 1000 for k in range(3000)]

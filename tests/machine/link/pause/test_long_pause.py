@@ -68,13 +68,13 @@ def test_a_pause_longer_than_any_firmware_s_idle_time_keeps_the_motors_on_and_th
 
 
 @pytest.mark.parametrize(("dialect", "said"), [("marlin", "M84 S0"), ("klipper", "G4 P1"), ("reprapfirmware", "")])
-def test_each_firmware_is_kept_awake_in_its_own_words(dialect: str, said: str) -> None:
+def test_each_firmware_is_kept_awake_with_its_own_command(dialect: str, said: str) -> None:
     watcher = Patience(profile_of(dialect, minutes=0.0)).after(200.0, Command.RESUME)
     watcher.run(PROGRAM)
     assert [watcher.lines().count(word) for word in ("M84 S0", "G4 P1")] == [4 * (said == "M84 S0"), 4 * (said == "G4 P1")]
 
 
-def test_a_firmware_without_a_name_is_not_told_m84_which_might_switch_its_motors_off() -> None:
+def test_a_firmware_without_a_name_is_not_sent_m84_which_might_disable_its_motors() -> None:
     watcher = Patience().after(200.0, Command.RESUME)
     rules = watcher.printer.firmware.board.rules
     watcher.printer.firmware.board.rules = type(rules)(**{**vars(rules), "identity": "FIRMWARE_NAME:Homebrew 1"})
@@ -82,7 +82,7 @@ def test_a_firmware_without_a_name_is_not_told_m84_which_might_switch_its_motors
     assert not [line for line in watcher.lines() if line.startswith("M84")]
 
 
-def test_the_nozzle_goes_off_after_its_minutes_and_the_bed_does_not() -> None:
+def test_in_a_long_pause_the_nozzle_is_switched_off_but_the_bed_stays_on() -> None:
     watcher = Patience().after(COLD_S, Command.RESUME)
     watcher.run(PROGRAM)
     before, after = (watcher.shown_at(seconds).temperature for seconds in (COOLS_S - 5.0, COLD_S - 5.0))
@@ -91,7 +91,7 @@ def test_the_nozzle_goes_off_after_its_minutes_and_the_bed_does_not() -> None:
     assert after.nozzle_c < 60.0 < after.bed_c + 1.0
 
 
-def test_a_cooled_pause_says_what_will_happen_and_goes_on_to_the_same_print() -> None:
+def test_a_cooled_pause_announces_the_reheating_and_resumes_the_same_print() -> None:
     watcher = Patience().after(COLD_S, Command.RESUME)
     assert not watcher.run(PROGRAM).cancelled
     assert watcher.shown_at(COOLS_S - 5.0).message == ""
@@ -109,7 +109,7 @@ def back_of(watcher: Watcher) -> list[str]:
     return lines[begin : next(index for index in range(begin, len(lines)) if lines[index] in BODY)]
 
 
-def test_a_cooled_nozzle_is_filled_where_the_tip_waits_before_it_goes_back() -> None:
+def test_a_cooled_nozzle_is_primed_at_the_parking_position_before_the_return() -> None:
     watcher = Patience().after(COLD_S, Command.RESUME)
     watcher.run(PROGRAM)
     back = back_of(watcher)
@@ -133,7 +133,7 @@ def test_zero_minutes_leave_the_nozzle_hot() -> None:
 
 
 @pytest.mark.parametrize("dialect", ["klipper", "reprapfirmware"])
-def test_other_firmwares_switch_off_and_heat_again_in_their_own_words(dialect: str) -> None:
+def test_other_firmwares_switch_off_and_heat_again_with_their_own_commands(dialect: str) -> None:
     watcher = Patience(profile_of(dialect)).after(COLD_S, Command.RESUME)
     assert not watcher.run(PROGRAM).cancelled
     assert watcher.shown_at(COOLS_S + 60.0).temperature.nozzle_target_c == 0.0
@@ -149,14 +149,14 @@ def test_a_pause_that_the_program_asks_for_cools_too() -> None:
     assert is_exact(watcher)
 
 
-def test_a_temperature_that_a_person_sets_in_a_pause_is_kept() -> None:
+def test_a_temperature_set_by_the_user_in_a_pause_is_kept() -> None:
     watcher = Patience().after(60.0, Command.LINE, "M104 S215").after(120.0, Command.RESUME)
     watcher.run(PROGRAM)
     assert "M109 S215" in watcher.lines()
     assert happened(watcher.printer.record, "nozzle 215")
 
 
-def test_what_a_person_does_in_a_pause_begins_its_time_anew() -> None:
+def test_a_user_command_in_a_pause_restarts_its_timer() -> None:
     watcher = Patience().after(100.0, Command.LINE, "M104 S215").after(400.0, Command.RESUME)
     watcher.run(PROGRAM)
     hot, off = (watcher.shown_at(100.0 + COOLS_S + seconds).temperature.nozzle_target_c for seconds in (-5.0, 5.0))
@@ -164,14 +164,14 @@ def test_what_a_person_does_in_a_pause_begins_its_time_anew() -> None:
     assert watcher.lines().count("M109 S215") == 1
 
 
-def test_a_nozzle_that_a_person_heats_again_is_no_cooled_one() -> None:
+def test_a_nozzle_reheated_by_the_user_no_longer_counts_as_cooled() -> None:
     watcher = Patience().after(COLD_S, Command.LINE, "M109 S200").after(COLD_S + 100.0, Command.RESUME)
     watcher.run(PROGRAM)
     assert watcher.shown_at(COLD_S + 95.0).message == ""
     assert len([line for line in back_of(watcher) if line.startswith("G1 E")]) == 1
 
 
-def test_a_heater_that_a_person_switches_off_in_a_pause_heats_again_when_the_print_goes_on() -> None:
+def test_a_heater_switched_off_by_the_user_in_a_pause_heats_again_on_resume() -> None:
     watcher = Patience().after(60.0, Command.LINE, "M104 S0").after(300.0, Command.RESUME)
     assert not watcher.run(PROGRAM).cancelled
     assert watcher.shown_at(295.0).temperature.nozzle_target_c == 0.0
@@ -189,7 +189,7 @@ def test_filament_is_not_pushed_through_a_cold_nozzle_for_a_firmware_would_end_t
     assert "G1 E20 F300" not in watcher.lines()
 
 
-def test_filament_is_pushed_when_the_person_has_heated_the_nozzle_before() -> None:
+def test_filament_is_pushed_after_the_user_has_heated_the_nozzle() -> None:
     watcher = Patience().after(COLD_S, Command.LINE, "M109 S200").after(COLD_S, Command.LINE, "G1 E20 F300")
     assert not watcher.after(COLD_S + 100.0, Command.RESUME).run(PROGRAM).cancelled
     assert "G1 E20 F300" in watcher.lines()
@@ -210,7 +210,7 @@ def test_an_emergency_stop_works_while_a_cooled_nozzle_is_heated_again() -> None
     assert watcher.shown_at(COLD_S + 4.0).state == "resuming"
 
 
-def test_a_cancel_on_the_way_back_lifts_the_tip_again() -> None:
+def test_a_cancel_during_the_return_lifts_the_tip_again() -> None:
     watcher = Patience().after(60.0, Command.RESUME)
     watcher.when["resuming"] = lambda: None
     profile, printer = watcher.profile, watcher.printer
@@ -229,7 +229,7 @@ def test_a_cancel_on_the_way_back_lifts_the_tip_again() -> None:
     assert printer.record.end[-1, 2] >= 60.0 + profile.machine.lift_mm - 1e-6
 
 
-def test_the_journal_of_a_pause_tells_where_the_tip_waits_also_while_it_is_heated_again(tmp_path: Path) -> None:
+def test_the_journal_of_a_pause_records_the_parking_position_even_during_reheating(tmp_path: Path) -> None:
     (tmp_path / "p.gcode").write_text("\n".join(PROGRAM))
     watcher = Patience().after(COLD_S, Command.RESUME).after(COLD_S + 10.0, Command.CANCEL)
     heading = JournalHeading(str(tmp_path / "p.gcode"), "", "p", {})

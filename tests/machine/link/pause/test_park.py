@@ -29,7 +29,7 @@ def printing(pose: Pose) -> tuple[PrintedBounds, np.ndarray]:
 
 
 @pytest.mark.parametrize("pose", POSES)
-def test_the_way_to_the_parking_place_is_clear_of_table_cradle_and_print(pose: Pose) -> None:
+def test_the_path_to_the_parking_position_is_clear_of_table_cradle_and_print(pose: Pose) -> None:
     bounds, at = printing(pose)
     printed, park = bounds.corners(), find_park_position(MACHINE, bounds.corners(), at, pose)
     assert park is not None
@@ -41,7 +41,7 @@ def test_the_way_to_the_parking_place_is_clear_of_table_cradle_and_print(pose: P
 
 
 @pytest.mark.parametrize("pose", POSES)
-def test_parking_goes_straight_up_first_and_stays_within_the_axes(pose: Pose) -> None:
+def test_parking_first_moves_straight_up_and_stays_within_the_axes(pose: Pose) -> None:
     bounds, at = printing(pose)
     park = find_park_position(MACHINE, bounds.corners(), at, pose)
     assert park is not None
@@ -51,7 +51,7 @@ def test_parking_goes_straight_up_first_and_stays_within_the_axes(pose: Pose) ->
         assert axis.limits_mm[0] <= value <= axis.limits_mm[1]
 
 
-def test_at_the_top_of_the_axis_the_tip_only_goes_aside() -> None:
+def test_at_the_top_of_the_z_axis_the_tip_only_moves_aside() -> None:
     top = MACHINE.z.limits_mm[1]
     park = find_park_position(MACHINE, printing(POSES[0])[0].corners(), np.array([0.0, 0.0, top]), POSES[0])
     assert park is not None
@@ -59,7 +59,7 @@ def test_at_the_top_of_the_axis_the_tip_only_goes_aside() -> None:
     assert park.stand_mm[2] == top
 
 
-def test_where_the_table_stands_in_the_way_up_the_tip_stays() -> None:
+def test_if_the_table_blocks_the_path_up_the_tip_does_not_move() -> None:
     bounds, _ = printing(Pose(85.0, 0.0))
     assert find_park_position(MACHINE, bounds.corners(), np.array([0.0, 0.0, 20.0]), Pose(85.0, 0.0)) is None
 
@@ -79,7 +79,7 @@ def test_filament_that_the_program_has_pulled_back_already_is_not_pulled_again()
     assert not [line for line in plan_park(modal, PROFILE, None)[0] if "E" in line]
 
 
-def test_a_lift_under_a_firmware_that_follows_the_table_goes_along_the_nozzle() -> None:
+def test_a_lift_in_workpiece_coordinates_moves_along_the_nozzle() -> None:
     words = lift_words(MACHINE, Pose(90.0, 0.0), 10.0, True)
     values = {word[0]: float(word[1:]) for word in words.split()}
     step = np.array([values.get(letter, 0.0) for letter in "XYZ"])

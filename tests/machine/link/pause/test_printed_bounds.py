@@ -39,7 +39,7 @@ def test_a_move_that_pushes_no_filament_is_not_in_the_box(travel: str) -> None:
     assert box(travel) == []
 
 
-def test_a_travel_is_none_where_the_sum_of_the_filament_was_never_told() -> None:
+def test_a_move_with_an_unknown_filament_position_counts_as_extruding() -> None:
     bounds, modal = PrintedBounds(MACHINE), ModalState(axes_of(MACHINE))
     printed = [bounds.track(modal, command)[1] for command in ("M83", "G1 X1 Y1 Z1", "G1 X2 E1", "M82", "G1 X3 E9")]
     assert printed == [False, False, True, False, True]

@@ -60,7 +60,7 @@ def test_lines_are_repeated_in_order_up_to_the_last_one_sent() -> None:
     assert resends.repeated == 2
 
 
-def test_a_line_may_be_asked_for_so_often_in_a_row_and_again_after_an_answer() -> None:
+def test_resends_of_a_line_are_limited_in_a_row_and_allowed_again_after_an_answer() -> None:
     resends = Resends()
     assert [resends.request(5) for _ in range(ASKED_LIMIT)] == [""] * ASKED_LIMIT
     assert resends.request(5) == "this line 10 times"

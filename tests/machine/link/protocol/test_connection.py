@@ -86,7 +86,7 @@ def test_a_line_without_end_is_thrown_away_and_its_tail_is_no_answer() -> None:
 
 
 @CHUNKS
-def test_the_greeting_agrees_on_numbers_then_asks_who_is_there(size: int) -> None:
+def test_the_greeting_agrees_on_line_numbers_then_asks_for_the_firmware(size: int) -> None:
     table = Table(size)
     table.say(b"T:20 /0\nhalf a li")
     table.wait(0.4)
@@ -134,7 +134,7 @@ def test_complaints_about_what_came_before_the_greeting_are_no_answers_to_it() -
     assert table.connection.state is State.OPEN
 
 
-def test_a_printer_that_takes_no_greeting_is_told_by_what_it_said() -> None:
+def test_a_printer_that_rejects_the_greeting_is_reported_with_its_last_answer() -> None:
     table = Table()
     for _ in range(SYNC_TRIES + 2):
         table.say(b"Error: Missing checksum\n")
@@ -189,7 +189,7 @@ def test_a_printer_that_does_not_heed_m110_is_given_the_numbers_it_asks_for(m110
     assert table.send("G1 X1") == frame(last + 3, "G1 X1")
 
 
-def test_a_printer_that_keeps_its_own_numbers_is_never_told_to_begin_anew() -> None:
+def test_a_printer_that_keeps_its_own_line_numbers_is_never_asked_to_reset_them() -> None:
     printer = Counting(99_897, b"ok\n")
     table = converse(printer)
     table.send("G1 X1")
@@ -198,7 +198,7 @@ def test_a_printer_that_keeps_its_own_numbers_is_never_told_to_begin_anew() -> N
     assert table.send("G1 X2") == frame(99_901, "G1 X2")
 
 
-def test_a_printer_that_answers_only_lines_without_numbers_is_told_from_one_that_is_off() -> None:
+def test_a_printer_that_answers_only_unnumbered_lines_is_distinguished_from_one_that_is_off() -> None:
     table = converse(Counting(0, b"", takes_numbers=False))
     assert str(table.connection.fault) == (
         "the printer answers M115, but neither M110 nor any line with a number and a checksum: this program sends no other "
@@ -227,7 +227,7 @@ def test_a_plain_printer_gets_one_line_at_a_time() -> None:
     assert table.connection.can_send("G1 X2")
 
 
-def test_a_printer_that_tells_numbers_gets_what_its_ring_holds() -> None:
+def test_a_printer_that_reports_line_numbers_is_sent_as_much_as_its_buffer_holds() -> None:
     table, command = opened(), "G1 X100.123 Y100.123 E1.12345"
     written = b""
     while table.connection.can_send(command):
@@ -314,7 +314,7 @@ def test_reports_are_no_progress() -> None:
     assert table.connection.state is State.PROBING
 
 
-def test_heating_may_take_its_time_and_is_asked_about_ever_later() -> None:
+def test_heating_may_take_long_and_is_queried_at_growing_intervals() -> None:
     table = opened()
     table.send("M109 S200")
     asked = []
@@ -448,12 +448,12 @@ def greeted_by(name: str, size: int = 10**6) -> Table:
     (" RepRapFirmware for Duet 2 WiFi/Ethernet FIRMWARE_VERSION: 3.5.1", REPRAPFIRMWARE),
     ("Klipper FIRMWARE_VERSION:v0.12.0-100", KLIPPER),
 ])  # fmt: skip
-def test_the_firmware_s_own_name_chooses_its_rules(name: str, firmware: Firmware) -> None:
+def test_the_firmware_s_name_selects_its_rules(name: str, firmware: Firmware) -> None:
     assert greeted_by(name).connection.greeting.firmware is firmware
 
 
 @pytest.mark.parametrize("name", ["RepRapFirmware for Duet", "Klipper"])
-def test_a_line_without_answer_is_never_repeated_to_a_firmware_that_asks_for_none(name: str) -> None:
+def test_an_unanswered_line_is_never_repeated_to_a_firmware_that_requests_no_resends(name: str) -> None:
     table = greeted_by(name)
     table.send("G1 X7")
     table.wait(4.1)
@@ -463,7 +463,7 @@ def test_a_line_without_answer_is_never_repeated_to_a_firmware_that_asks_for_non
     assert "line 3 (G1 X7) was not answered" in str(table.connection.fault)
 
 
-def test_a_late_answer_of_such_a_firmware_is_an_answer() -> None:
+def test_a_late_answer_of_a_firmware_without_resends_is_accepted() -> None:
     table = greeted_by("RepRapFirmware for Duet")
     table.send("G1 X7")
     table.wait(4.1)
@@ -502,7 +502,7 @@ def test_repetier_gets_as_many_characters_as_its_buffer_holds() -> None:
 
 
 @pytest.mark.parametrize(("rx_bytes", "lines"), [(63, 1), (127, 3), (1023, 4)])
-def test_the_window_keeps_to_the_machine_s_own_buffer_and_to_the_printer_s_places(rx_bytes: int, lines: int) -> None:
+def test_the_window_is_limited_by_the_machine_s_buffer_and_the_printer_s_free_places(rx_bytes: int, lines: int) -> None:
     table = Table()
     table.connection = Connection(PATIENT, 0.0, rx_bytes=rx_bytes)
     table.wait(0.6)
@@ -537,7 +537,7 @@ def numbered_to(last: int, advanced: bool = True) -> Table:
 
 
 @pytest.mark.parametrize("advanced", [True, False])
-def test_numbers_begin_anew_before_they_grow_too_long(advanced: bool) -> None:
+def test_line_numbers_are_reset_before_they_grow_too_long(advanced: bool) -> None:
     table = numbered_to(4, advanced)
     for number in (3, 4):
         table.send("G1 X1")
@@ -575,7 +575,7 @@ def test_a_new_beginning_without_answer_ends_the_print() -> None:
     assert isinstance(table.connection.fault, SilenceError)
 
 
-def test_a_banner_that_comes_after_the_start_was_heeded_does_not_begin_the_greeting_anew() -> None:
+def test_a_banner_after_the_start_was_handled_does_not_restart_the_greeting() -> None:
     table = Table()
     table.wait(0.6)
     assert table.connection.state is State.SYNC
@@ -591,7 +591,7 @@ def test_no_number_is_longer_than_a_checked_line_has_room_for() -> None:
     assert all(len(frame(row.line.last_number + QUESTIONS_MOST, longest)) - 1 <= LINE_LIMIT for row in FIRMWARES)
 
 
-def test_an_error_of_two_lines_is_told_whole_and_nothing_is_sent_meanwhile() -> None:
+def test_a_two_line_error_is_reported_whole_and_nothing_is_sent_meanwhile() -> None:
     table = opened()
     table.say(b"Error:0\n")
     assert (table.connection.fault, table.connection.can_send("G1 X1")) == (None, False)
@@ -599,14 +599,14 @@ def test_an_error_of_two_lines_is_told_whole_and_nothing_is_sent_meanwhile() -> 
     assert "Error:0: Extruder switched off. MAXTEMP triggered !" in str(table.connection.fault)
 
 
-def test_an_error_whose_words_never_come_is_an_error() -> None:
+def test_an_error_without_its_second_line_is_still_an_error() -> None:
     table = opened()
     table.say(b"Error:0\n")
     table.wait(0.3)
     assert isinstance(table.connection.fault, FirmwareError)
 
 
-def test_a_line_asked_for_in_every_tenth_line_is_too_much_noise() -> None:
+def test_a_resend_request_for_every_tenth_line_is_too_much_noise() -> None:
     table = opened()
     for number in range(11, 300):
         table.send("G1 X1")
@@ -642,7 +642,7 @@ def test_rubbish_of_a_boot_loader_before_the_banner_is_forgiven() -> None:
     assert table.connection.state is State.OPEN
 
 
-def test_a_device_that_is_no_printer_is_told_by_its_own_words() -> None:
+def test_a_device_that_is_not_a_printer_is_reported_with_its_output() -> None:
     table = Table()
     while table.connection.fault is None and table.now_s < 100:
         table.say(b"$GPGGA,123519,4807.038,N\r\n")

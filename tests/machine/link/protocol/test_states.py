@@ -73,7 +73,7 @@ def test_last_words_a_restart_and_a_lost_port_lead_from_every_state_where_they_m
 
 
 @pytest.mark.parametrize(("state", "last"), [*product(list(TALKS)[1:], [KILLED]), *product(list(TALKS)[3:], [b"start\n"])])
-def test_what_has_ended_stays_so_whatever_is_said_and_nothing_is_sent_any_more(state: State, last: bytes) -> None:
+def test_an_ended_connection_stays_ended_and_sends_nothing_whatever_it_receives(state: State, last: bytes) -> None:
     table = TALKS[state][0]()
     table.say(last)
     ended = table.connection.state
@@ -85,7 +85,7 @@ def test_what_has_ended_stays_so_whatever_is_said_and_nothing_is_sent_any_more(s
 
 
 @NAMED
-def test_a_printer_that_never_answers_any_more_is_given_up_from_every_state(state: State) -> None:
+def test_a_printer_that_stops_answering_is_given_up_from_every_state(state: State) -> None:
     table = TALKS[state][0]()
     for _ in range(3000):
         table.wait(0.5)
