@@ -225,7 +225,8 @@ def fill(filled: NDArray[np.bool_], origin: Floats, step: float, segments: Float
             continue
         for axis in range(3):
             d[axis] /= length
-        reach, pieces = half + height, int(length / CELL_MM) + 1
+        # a corner of a bar is sqrt(2) * half from its segment's end
+        reach, pieces = 1.5 * half + height + ROUND_MM, int(length / CELL_MM) + 1
         for k in range(pieces):
             for axis in range(3):
                 u, v = a[axis] + d[axis] * length * k / pieces, a[axis] + d[axis] * length * (k + 1) / pieces

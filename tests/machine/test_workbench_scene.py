@@ -30,7 +30,8 @@ def opened(browser: Browser, bench: Running, name: str, content: bytes) -> None:
 
 
 def seen(browser: Browser, *place_mm: float) -> tuple[float, float]:
-    """The position of a point of the plate's frame in the window."""
+    """The position of a point of the plate's frame in the window, once a frame is drawn."""
+    browser.value("new Promise((drawn) => requestAnimationFrame(() => requestAnimationFrame(drawn)))")
     places = f"""(() => {{
       const {{ left, top }} = $('canvas').getBoundingClientRect(), [x, y] = view.picture.placeOf({json.dumps(place_mm)});
       return [left + x, top + y];

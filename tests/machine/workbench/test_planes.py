@@ -67,7 +67,7 @@ def test_an_edit_gives_the_planes_in_print_order(edit: str, asked: dict[str, Any
         ("remove", {"part": 5}, "part is 5: 2 to 4 is allowed"),
         ("add", {"after": 0, **NEW}, "after is 0: 1 to 4 is allowed"),
         ("reorder", {"part": 2, "to": None}, "to is null: it must be a whole number"),
-        ("move", {"part": 2, "normal": [0, 0, 0], "offset_mm": 1}, "no direction: a length of about 1 is expected"),
+        ("move", {"part": 2, "normal": [0, 0, 0], "offset_mm": 1}, "is not a direction: a length of about 1 is expected"),
         ("move", {"part": 2, "normal": [0, 0, True], "offset_mm": 1}, "normal.2 is true: it must be a list of three numbers"),
         (
             "move",
