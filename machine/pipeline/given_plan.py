@@ -28,9 +28,6 @@ def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
     alone = len(models) == 1 and not (request.copies > 1 and request.profile.process.complete_objects)
     stops = request.stops if alone else ()  # else they count the parts of all
     each = {name: replace(request, model=name, beside=(), plans=(), stops=stops) for name in models}
-    for name in request.beside if request.project is not None else ():
-        if name != request.model:  # a project's plan and plate are of its first model
-            each[name] = replace(each[name], own_marks=True, plate=None)
     names = [own.name for own in each.values()]
     if request.profile.parts and len(models) > 1:
         part = request.profile.parts[0]
@@ -50,6 +47,9 @@ def request_of_each(request: ModelRequest) -> dict[str, ModelRequest]:
                 f"{option('plan', file)}: {option('plan', each[name].plan)} cuts {model} already, and one plan cuts a model"
             )
         each[name] = replace(each[name], plans=(file,))
+    for name, own in each.items() if request.project is not None else ():
+        if name != request.model:  # a project's plate is of its first model, and an old one has no plans of the others
+            each[name] = replace(own, own_marks=own.own_marks or not own.plans, plate=None)
     return each
 
 

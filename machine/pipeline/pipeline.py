@@ -74,17 +74,9 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     to_build: `build` follows: its kernels are compiled meanwhile, and rows of the front without a choice get no time. Raises
     PlanError for models that do not fit on a plate, and for options of a single model.
     """
-    compilers.keep_modules()
-    ranker_named(request.ranker)  # report a wrong ranker before any other work
-    check_copies(request.copies, option("copies"))
-    check_number(request)
-    requests = request_of_each(request)
     began = perf_counter()
+    each = decompose_each(request, to_build)
     models = [name for name in (request.model, *request.beside) for _ in range(request.copies)]
-    each = {}
-    for name in dict.fromkeys(models):
-        with naming(Path(name).name if request.beside else ""):
-            each[name] = decompose_alone(requests[name], to_build)
     first = each[request.model]
     profile = first.profile if len(each) == 1 else request.profile  # each has an orientation of its own
     settings = {own.decomposition: own.profile.parts for own in each.values()}
@@ -92,7 +84,20 @@ def decompose_model(request: ModelRequest, to_build: bool = False) -> Decomposed
     return replace(first, decomposition=decomposition, profile=profile, total_s=perf_counter() - began)
 
 
-def decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
+def decompose_each(request: ModelRequest, to_build: bool) -> dict[str, Decomposed]:
+    """Decompose each model of a plate by itself, the first one first. Raises PlanError for options of a single model."""
+    compilers.keep_modules()
+    ranker_named(request.ranker)  # report a wrong ranker before any other work
+    check_copies(request.copies, option("copies"))
+    check_number(request)
+    each = {}
+    for name, own in request_of_each(request).items():
+        with naming(Path(name).name if request.beside else ""):
+            each[name] = _decompose_alone(own, to_build)
+    return each
+
+
+def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     """Decompose one of the models by itself."""
     record_file, given = request.outputs.record, read_given_plan(request)
     profile = with_plan_settings(request.profile, given)

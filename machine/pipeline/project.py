@@ -12,7 +12,7 @@ import os
 import re
 import shutil
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
@@ -86,14 +86,15 @@ def close_projects() -> None:
 
 @dataclass(frozen=True)
 class Project:
-    """A model and everything that decides its print; once read, its files are in the project's folder.
+    """A model and everything that decides its print, and the other models on its plate; once read, its files are in the project's
+    folder.
 
     model: None for a demo, found by its name; own_names: the user's names of profiles that are files, by kind; rotation: rows of
     the model's rotation after reading; plan: None if the model is neither cut nor marked; parts: 0 before a decomposition;
     locked: the parts, counted from the second, whose planes are locked; stops: where the print waits for the user; marks_in_plan:
     the plan includes the boxes of the model's file; figures: of the print, for users and other programs; plate: of the model in a
-    slicer file; recommended: number of parts that the search prefers, 0: there was no search; beside: name, model and number of
-    copies of each other model on the plate.
+    slicer file; recommended: number of parts that the search prefers, 0: there was no search; beside: the other models on the
+    plate, with the same profiles; worked_on: the one that the user turns and cuts, 0: this one.
     """
 
     name: str
@@ -111,7 +112,8 @@ class Project:
     plate: int | None = None
     marks_in_plan: bool = False
     recommended: int = 0
-    beside: tuple[tuple[str, Path | None, int], ...] = ()
+    beside: "tuple[Project, ...]" = ()
+    worked_on: int = 0
 
     def applied(self, request: ModelRequest, file: Path, copies: int | None) -> ModelRequest:
         """A request for the project's model: the project provides what the command line leaves open.
@@ -122,20 +124,30 @@ class Project:
         if self.beside and copies is not None and copies > 1:
             raise PlanError(f"{option('copies', copies)}: the project {file} says how many of each model stand on its plate")
         self.check_plate(request.plate, file)
-        own_plan = self.plan if not request.plans and request.planes is None else None
-        if own_plan is not None:
+        others = self.beside if copies is None else ()
+        own_plans = self._plans_left(request, others)
+        if self.plan in own_plans:
             self._check_plan_goes_with(request, file)
         return replace(
             request,
             model=self.argument,
             project=file,
-            plans=request.plans if own_plan is None else (own_plan,),
-            own_marks=own_plan is None or not self.marks_in_plan,
+            plans=(*request.plans, *own_plans),
+            own_marks=self.plan not in own_plans or not self.marks_in_plan,
             stops=request.stops or self.stops,
-            copies=self.copies if copies is None and not self.beside else copies or 1,
-            beside=self._beside() if copies is None and self.beside else (),
+            copies=self.copies if copies is None and not others else copies or 1,
+            beside=self._beside() if others else (),
             plate=self.plate,
         )
+
+    def _plans_left(self, request: ModelRequest, others: "Sequence[Project]") -> tuple[Path, ...]:
+        """The plans of the project's models that the user's options leave in use."""
+        if request.planes is not None or (request.plans and not others):
+            return ()
+        from mdp.search.plan_reading import read_plan
+
+        replaced = {read_plan(file).model for file in request.plans}
+        return tuple(each.plan for each in (self, *others) if each.plan is not None and each.name not in replaced)
 
     def check_plate(self, plate: int | None, file: Path) -> None:
         """Raise PlanError when another plate is requested: the project's parts belong to one."""
@@ -154,64 +166,72 @@ class Project:
     @property
     def names(self) -> list[str]:
         """The names of all models on the plate."""
-        return [self.name, *(name for name, _, _ in self.beside)]
+        return [each.name for each in (self, *self.beside)]
 
     @property
     def files(self) -> list[Path]:
         """The files of all models on the plate except demos."""
-        return [file for file in (self.model, *(file for _, file, _ in self.beside)) if file is not None]
+        return [each.model for each in (self, *self.beside) if each.model is not None]
 
     @property
     def argument(self) -> str:
         """MODEL on a command line."""
-        return _argument(self.name, self.model)
+        return self.name if self.model is None else str(self.model)
 
     def _beside(self) -> tuple[str, ...]:
         """The models beside the first copy of the first one, on a command line."""
-        others = (count * [_argument(name, model)] for name, model, count in self.beside)
+        others = (other.copies * [other.argument] for other in self.beside)
         return tuple(chain((self.copies - 1) * [self.argument], *others))
 
 
-def _argument(name: str, model: Path | None) -> str:
-    return name if model is None else str(model)
-
-
-def write_folder(folder: Path, project: Project, plan: PlanFile | None) -> None:
-    """Write a project's folder. Older models in it are deleted; profiles and meshes stay, for an undone step may name them.
-    Raises OSError, ProfileError and PlanError; the record is written last, so that it only names existing files."""
+def write_folder(folder: Path, project: Project, plans: Sequence[PlanFile | None]) -> None:
+    """Write a project's folder. plans: of each model on the plate. Older models and plans in it are deleted; profiles and meshes
+    stay, for an undone step may name them. Raises OSError, ProfileError and PlanError; the record is written last, so that it
+    only names existing files."""
     profiles = {kind: name for kind in KINDS if (name := _profile_file(folder, kind, getattr(project.given, kind)))}
     models = {file: _copied(file, folder, "model") for file in project.files}
-    if plan is not None:
+    plan_files = {plan_file(number): plan for number, plan in enumerate(plans) if plan is not None}
+    for name, plan in plan_files.items():
         from mdp.search.plan_writing import plan_text  # loads tomlkit, which only projects need
 
-        write_whole(folder / PLAN, plan_text(with_meshes(plan, folder), folder).encode())
+        write_whole(folder / name, plan_text(with_meshes(plan, folder), folder).encode())
+    first, *others = [
+        {
+            "name": each.name,
+            "model": "" if each.model is None else models[each.model],
+            "rotation": [list(row) for row in each.rotation],
+            "plan": plan is not None,
+            "parts": each.parts,
+            "locked": list(each.locked),
+            "copies": each.copies,
+            "recommended": each.recommended,
+        }
+        for each, plan in zip((project, *project.beside), plans, strict=True)
+    ]
     given = {**asdict(project.given), **profiles, "settings": list(project.given.settings)}
     record = checked_record(
         version=VERSION if project.beside else VERSION_OF_ONE_MODEL,
         program=PROGRAM,
-        name=project.name,
-        model="" if project.model is None else models[project.model],
+        **first,
         given=GivenRecord(**given),
         own_profiles={kind: _bare_name(Path(getattr(project.given, kind))) for kind in profiles},
-        rotation=[list(row) for row in project.rotation],
-        plan=plan is not None,
-        parts=project.parts,
-        locked=list(project.locked),
         pauses=[stop.at for stop in project.stops if not stop.change],
         changes=[stop.at for stop in project.stops if stop.change],
-        copies=project.copies,
-        beside=[(name, "" if file is None else models[file], copies) for name, file, copies in project.beside],
+        beside=others,
+        worked_on=project.worked_on,
         plate=project.plate,
         marks_in_plan=project.marks_in_plan,
-        recommended=project.recommended,
         figures=project.figures,
     )
     write_whole(folder / RECORD, record.model_dump_json().encode())
-    for file in folder.glob("model-*"):
-        if file.name not in models.values():
+    for file in (*folder.glob("model-*"), *folder.glob("plan*.toml")):
+        if file.name not in (*models.values(), *plan_files):
             file.unlink()
-    if plan is None:
-        (folder / PLAN).unlink(missing_ok=True)
+
+
+def plan_file(number: int) -> str:
+    """Name of the file with the plan of a model on the plate, counted from 0."""
+    return PLAN if number == 0 else f"plan-{number + 1}.toml"
 
 
 def _profile_file(folder: Path, kind: str, name: str) -> str:
@@ -299,20 +319,26 @@ def read_folder(folder: Path) -> Project:
 def _project_of(folder: Path, record: Record) -> Project:
     given, own_names = record.given, {str(kind): Path(name).name for kind, name in record.own_profiles.items()}
     files = {kind: str(folder / Path(getattr(given, kind)).name) for kind in own_names}
-    x, y, z = record.rotation
-    return Project(
-        name=record.name,
-        model=folder / Path(record.model).name if record.model else None,
-        given=Given(**{**given.model_dump(), **files, "settings": tuple(given.settings)}),
-        rotation=((x[0], x[1], x[2]), (y[0], y[1], y[2]), (z[0], z[1], z[2])),
-        plan=folder / PLAN if record.plan else None,
-        parts=record.parts,
-        locked=tuple(record.locked),
+    first, *others = [
+        Project(
+            name=each.name,
+            model=folder / Path(each.model).name if each.model else None,
+            given=Given(**{**given.model_dump(), **files, "settings": tuple(given.settings)}),
+            rotation=tuple((x, y, z) for x, y, z in each.rotation),
+            plan=folder / plan_file(number) if each.plan else None,
+            parts=each.parts,
+            locked=tuple(each.locked),
+            copies=each.copies,
+            marks_in_plan=record.marks_in_plan,
+            recommended=each.recommended,
+        )
+        for number, each in enumerate((record, *record.beside))
+    ]
+    return replace(
+        first,
         stops=record.stops,
-        copies=record.copies,
-        beside=tuple((name, folder / Path(file).name if file else None, copies) for name, file, copies in record.beside),
-        marks_in_plan=record.marks_in_plan,
-        recommended=record.recommended,
+        beside=tuple(others),
+        worked_on=record.worked_on,
         plate=record.plate,
         own_names=own_names,
         figures=record.figures,
@@ -322,14 +348,17 @@ def _project_of(folder: Path, record: Record) -> Project:
 
 def _check_inside(folder: Path, project: Project) -> None:
     """Raise PlanError when an unpacked project's files are not those it names, or have changed."""
-    for name, model in ((project.name, project.model), *((name, model) for name, model, _ in project.beside)):
-        if model is None and not name.startswith(DEMO):
+    models = (project, *project.beside)
+    for each in models:
+        if each.model is None and not each.name.startswith(DEMO):
             raise PlanError(f"{RECORD}: model is missing")
-        if model is not None and not model.name.startswith("model-"):
-            raise PlanError(f"{RECORD}: model is {model.name!r}: a file model-... of the project is expected")
-    named = [*project.files, *(Path(getattr(project.given, kind)) for kind in project.own_names), folder / PLAN]
-    for file in named:
-        if file is not None and not file.is_file():
+        if each.model is not None and not each.model.name.startswith("model-"):
+            raise PlanError(f"{RECORD}: model is {each.model.name!r}: a file model-... of the project is expected")
+    if project.plan is None:
+        raise PlanError(f"{RECORD}: plan is false: a project has one")
+    plans = [each.plan for each in models if each.plan is not None]
+    for file in (*project.files, *(Path(getattr(project.given, kind)) for kind in project.own_names), *plans):
+        if not file.is_file():
             raise PlanError(f"its file {file.name or RECORD} is missing")
     for file in folder.iterdir():
         if (digest := ADDED.match(file.name)) is not None and digest[2] != _digest(file):
@@ -340,23 +369,28 @@ def _check_inside(folder: Path, project: Project) -> None:
             name = str(_toml(Path(name)).get(PARENT, shipped(kind)[0]))
         if is_file_name(name):
             raise PlanError(f"{kind} is {name!r}: a profile that ships with the program, or a file of the project, is expected")
-    if project.plan is None:
-        raise PlanError(f"{RECORD}: plan is false: a project has one")
-    text = _toml(project.plan)
+    for each in models:
+        if each.plan is not None:
+            _check_plan(each, each.plan)
+
+
+def _check_plan(project: Project, file: Path) -> None:
+    """Raise PlanError if the plan of one of a project's models cannot be read, or does not agree with the record."""
+    text = _toml(file)
     lists = (text[key] for key in (*ZONE_KINDS, "modifier") if isinstance(text.get(key), list))
     for mesh in (table["mesh"] for tables in lists for table in tables if isinstance(table, dict) and "mesh" in table):
         if Path(str(mesh)).name != mesh:
-            raise PlanError(f"{PLAN}: mesh is {mesh!r}: a file of the project is expected")
+            raise PlanError(f"{file.name}: mesh is {mesh!r}: a file of the project is expected")
     try:
         from mdp.search.plan_reading import read_plan  # takes 30 ms to load; only projects need it
 
-        plan = read_plan(project.plan)
+        plan = read_plan(file)
     except PlanError as error:
-        raise PlanError(f"{error}".replace(f"{folder}{os.sep}", "")) from None
+        raise PlanError(f"{error}".replace(f"{file.parent}{os.sep}", "")) from None
     if max(project.parts, 1) != len(plan.parts) + 1:
-        raise PlanError(f"{RECORD}: parts is {project.parts}: {PLAN} has {len(plan.parts) + 1}")
+        raise PlanError(f"{RECORD}: parts is {project.parts}: {file.name} has {len(plan.parts) + 1}")
     if not np.allclose(plan.orientation or STANDING, project.rotation, atol=1e-9):
-        raise PlanError(f"{RECORD}: rotation is {project.rotation}, which is not the orientation of {PLAN}")
+        raise PlanError(f"{RECORD}: rotation is {project.rotation}, which is not the orientation of {file.name}")
 
 
 def _toml(file: Path) -> dict[str, Any]:
@@ -373,8 +407,8 @@ def figures_of(row: FrontRow | None) -> dict[str, float]:
     return {name: value for name in names if (value := getattr(row, name, None)) is not None}
 
 
-def project_bytes(project: Project, plan: PlanFile, mesh: Mesh, picture: bytes) -> bytes:
-    """Content of a project file. mesh: the oriented model; picture: a PNG.
+def project_bytes(project: Project, plans: Sequence[PlanFile], mesh: Mesh, picture: bytes) -> bytes:
+    """Content of a project file. plans: of each model on the plate; mesh: the first one in its orientation; picture: a PNG.
 
     Raises OSError, and PlanError for a project that could not be opened again.
     """
@@ -386,7 +420,7 @@ def project_bytes(project: Project, plan: PlanFile, mesh: Mesh, picture: bytes) 
     content = io.BytesIO()
     with TemporaryDirectory(prefix="tiltprint-save-") as name:
         folder = Path(name)
-        write_folder(folder, project, plan)
+        write_folder(folder, project, plans)
         model = model_xml([(mesh, project.name)], {"Title": project.name, "Application": PROGRAM})
         digest = hashlib.sha256(model.encode()).hexdigest().encode()
         own_files = [(INSIDE + path.name, path.read_bytes()) for path in sorted(folder.iterdir())]
@@ -422,7 +456,7 @@ def open_project(model: str) -> Project | None:
     def renamed(name: str, file: Path | None) -> Path | None:
         return None if file is None else Path(shutil.copyfile(file, named / Path(name).name))
 
-    beside = tuple((name, renamed(name, file), copies) for name, file, copies in project.beside)
+    beside = tuple(replace(other, model=renamed(other.name, other.model)) for other in project.beside)
     return replace(project, model=renamed(project.name, project.model), beside=beside)
 
 

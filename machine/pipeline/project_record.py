@@ -1,10 +1,10 @@
 """Project record: the content of a project's `work.json`, and its checks."""
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Self
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError, model_validator
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError, model_validator
 
 from machine.pipeline.requests import MOST_COPIES
 from machine.planning.stops import Stop, parse_stops
@@ -13,9 +13,10 @@ from profiles.part_settings import MOST_PARTS
 from profiles.places import KINDS
 from profiles.wording import LONGEST_VALUE, sentences
 
-VERSION = 2
+VERSION = 3  # 2: other models without their cuts
 VERSION_OF_ONE_MODEL = 1  # version for a project without other models, which older versions of this program can read
 RECORD = "work.json"
+NESTED = ("beside", "figures", "own_profiles")  # keys whose values are tables; a table's keys may be free
 LONGEST_NAME = 255  # bytes of a file name on any disk
 
 
@@ -29,11 +30,7 @@ def _not_newer(value: object) -> object:
     return value
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(strict=True, frozen=True, allow_inf_nan=False)
-
-
-class GivenRecord(_Table):
+class GivenRecord(BaseModel, strict=True, frozen=True):
     """Names of profiles or of the project's files, and KEY=VALUE settings over them."""
 
     machine: str
@@ -42,46 +39,65 @@ class GivenRecord(_Table):
     settings: list[str]
 
 
-class Record(_Table):
-    """A project's record, with the values of machine.pipeline.project.Project. model: a file of the project; "": a demo;
-    beside: name, model and number of copies of each other model on the plate."""
+class ModelRecord(BaseModel, strict=True, frozen=True, allow_inf_nan=False):
+    """One of the models of a project. model: a file of the project; "": a demo."""
 
-    version: Annotated[int, BeforeValidator(_not_newer), Field(ge=1)]
-    program: str = ""
     name: str
     model: str
-    given: GivenRecord
-    own_profiles: dict[str, str]
     rotation: list[list[float]]
     plan: bool
     parts: Annotated[int, Field(ge=0, le=MOST_PARTS)]
     locked: list[Annotated[int, Field(ge=0)]]
-    pauses: list[str]
-    changes: list[str]
     copies: Annotated[int, Field(ge=1, le=MOST_COPIES)]
-    beside: list[tuple[str, str, Annotated[int, Field(ge=1, le=MOST_COPIES)]]] = []
-    plate: Annotated[int, Field(ge=0)] | None = None
-    marks_in_plan: bool = True
     recommended: Annotated[int, Field(ge=0, le=MOST_PARTS)] = 0
-    figures: dict[str, float] = {}
 
     @model_validator(mode="after")
-    def _agrees(self) -> "Record":
+    def _is_possible(self) -> Self:
         matrix = np.array(self.rotation) if [len(row) for row in self.rotation] == [3, 3, 3] else np.zeros((3, 3))
         matrix = np.clip(matrix, -2.0, 2.0)  # no entry of a rotation is that large, and products of larger numbers overflow
         if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-6) or np.linalg.det(matrix) < 0.0:
             raise ValueError(f"rotation is {self.rotation}: it must be three rows of a rotation")
-        if not self.own_profiles.keys() <= set(KINDS):
-            raise ValueError(f"own_profiles is of {', '.join(self.own_profiles)}: {', '.join(KINDS)} are known")
         if any(k >= max(self.parts, 1) - 1 for k in self.locked):
             raise ValueError(f"locked is {self.locked}: it must be places of the {max(self.parts, 1) - 1} planes, from 0")
+        if not is_file_name_anywhere(self.name):
+            raise ValueError(f"name is {self.name!r}: it must be the name of a file")
+        return self
+
+
+def _of_version_2(value: object) -> object:
+    """Another model on the plate; older versions wrote its name, model and number of copies alone."""
+    if not isinstance(value, list) or len(value) != 3:
+        return value
+    uncut = {"rotation": np.eye(3).tolist(), "plan": False, "parts": 0, "locked": []}
+    return {"name": value[0], "model": value[1], "copies": value[2], **uncut}
+
+
+class Record(ModelRecord, frozen=True):
+    """A project's record, with the values of machine.pipeline.project.Project; those of ModelRecord are of the first model on the
+    plate."""
+
+    version: Annotated[int, BeforeValidator(_not_newer), Field(ge=1)]
+    program: str = ""
+    given: GivenRecord
+    own_profiles: dict[str, str]
+    pauses: list[str]
+    changes: list[str]
+    beside: list[Annotated[ModelRecord, BeforeValidator(_of_version_2)]] = []
+    worked_on: Annotated[int, Field(ge=0)] = 0
+    plate: Annotated[int, Field(ge=0)] | None = None
+    marks_in_plan: bool = True
+    figures: dict[str, float] = {}
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        if not self.own_profiles.keys() <= set(KINDS):
+            raise ValueError(f"own_profiles is of {', '.join(self.own_profiles)}: {', '.join(KINDS)} are known")
         _ = self.stops
-        names = [self.name, *(name for name, _, _ in self.beside)]
-        if len(set(names)) < len(names):
-            raise ValueError(f"beside names {', '.join(names[1:])} next to {self.name}: each model must occur once")
-        for name in names:
-            if not is_file_name_anywhere(name):
-                raise ValueError(f"name is {name!r}: it must be the name of a file")
+        names = [each.name for each in self.beside]
+        if len({self.name, *names}) <= len(names):
+            raise ValueError(f"beside names {', '.join(names)} next to {self.name}: each model must occur once")
+        if self.worked_on > len(names):
+            raise ValueError(f"worked_on is {self.worked_on}: it must be one of the {len(names) + 1} models, from 0")
         return self
 
     @property
@@ -131,7 +147,7 @@ def _in_words(error: ValidationError) -> str:
         return f"{RECORD} is not JSON"
     if not problem["loc"] and problem["type"] != "value_error":
         return f"{RECORD} is {str(problem['input'])[:LONGEST_VALUE]}: a table of keys is expected"
-    if isinstance(last, int) or path[0] in ("figures", "own_profiles"):  # an item of a list, or of a table with free keys
+    if isinstance(last, int) or path[0] in NESTED:
         key, expected = ".".join(map(str, path)), problem["msg"].removeprefix("Input should be ")
         return f"{RECORD}: {key} is {str(problem['input'])[:LONGEST_VALUE]}: it must be {expected}"
     return f"{RECORD}: {sentences([problem], Record)[0]}"

@@ -12,7 +12,7 @@ from tests.shapes import box, tee
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
 ROWS = """JSON.stringify([...$('plate-list').children].map(
-  (row) => [row.firstChild.firstChild.data, row.querySelector('input').value]))"""
+  (row) => [row.firstChild.textContent, row.querySelector('input').value]))"""
 COPIES = "document.querySelector('#plate-list li:last-child input')"
 
 
@@ -32,11 +32,11 @@ def test_a_model_is_added_drawn_counted_taken_off_the_plate_and_there_after_a_re
     browser.value(f"{{ {COPIES}.value = 3; {COPIES}.dispatchEvent(new Event('change')); }}")
     waits_for_rows(browser, '[["first.stl","1"],["second.stl","3"]]', "All 4 stand on the plate.")
     browser.click("#tab-settings")
-    browser.wait("$('command-line').textContent.startsWith('tiltprint export first.stl second.stl:3 ')")
+    browser.wait("$('command-line').textContent.startsWith('tiltprint export first.3mf ')")
     browser.click("#tab-model")
     browser.open(bench.address)
     waits_for_rows(browser, '[["first.stl","1"],["second.stl","3"]]', "All 4 stand on the plate.")
-    browser.click("#plate-list li:last-child button")
+    browser.click("#plate-list li:last-child button:last-child")
     waits_for_rows(browser, '[["first.stl","1"]]', "")
     browser.wait("document.documentElement.dataset.others === ''")
     assert (both != pixels(browser)).any(axis=2).mean() > 0.02
@@ -74,7 +74,27 @@ def test_models_without_a_place_are_drawn_in_red_beside_the_plate_and_nothing_ca
     assert browser.complaints == []
 
 
-def test_the_page_says_that_a_scale_is_that_of_all_models_and_lists_the_size_of_each(browser: Browser, bench: Running) -> None:
+def test_a_click_on_another_model_in_the_picture_or_the_list_works_on_that_and_moves_none(
+    browser: Browser, bench: Running
+) -> None:
+    open_model(browser, bench, "one.stl", stl(tee()))
+    choose(browser, "two.stl", stl(box(20, 20, 20)), "add-file")
+    browser.wait("document.documentElement.dataset.others && $('plate-told').textContent === 'All 2 stand on the plate.'")
+    browser.click("#fit")
+    there = browser.value("""(() => {
+      const { state } = modules["page/store"].store, [, [low, high]] = state.other_boxes[0], [x, y] = state.copies_mm[0];
+      return view.picture.placeOf([(low[0] + high[0]) / 2 - x, (low[1] + high[1]) / 2 - y, (low[2] + high[2]) / 2]);
+    })()""")
+    places = "JSON.stringify(modules['page/store'].store.state.copies_mm)"
+    first = browser.value(places)
+    browser.press(*there)
+    browser.wait("$('title').textContent === 'two.stl' && $('plate-told').textContent === 'All 2 stand on the plate.'")
+    browser.click("#plate-list li:first-child button")
+    browser.wait(f"$('title').textContent === 'one.stl' && {places} === '{first}'")
+    assert browser.complaints == []
+
+
+def test_the_page_says_that_a_scale_is_that_of_all_models_and_lists_the_parts_of_each(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "scaled.stl", stl(tee()))
     browser.click("#tab-model")
     assert browser.value("$('scale-told').hidden")
@@ -83,5 +103,5 @@ def test_the_page_says_that_a_scale_is_that_of_all_models_and_lists_the_size_of_
     browser.value("{ $('scale').value = 50; $('scale').dispatchEvent(new Event('change')); }")
     browser.wait("$('undo').ariaLabel === 'undo: scale all models on the plate'")
     sizes = "JSON.stringify([...$('plate-list').querySelectorAll('small')].map((one) => one.textContent))"
-    browser.wait(f'{sizes} === \'["20.0 × 5.0 × 20.0 mm","10.0 × 10.0 × 10.0 mm"]\'')
+    browser.wait(f'{sizes} === \'["not cut","not cut"]\'')
     assert browser.complaints == []

@@ -16,7 +16,7 @@ from machine.pipeline.choice import in_parts
 from machine.pipeline.comparison import alternatives_json, compare_with_one_part
 from machine.pipeline.output import check_model_files, check_writable, plain_name, write_bytes, write_json, write_lines
 from machine.pipeline.pictures import parts_together, png_bytes
-from machine.pipeline.pipeline import Decomposed, decompose_model
+from machine.pipeline.pipeline import Decomposed, decompose_each
 from machine.pipeline.programs import load_program, refuse_errors
 from machine.pipeline.project import PICTURE_PX, STANDING, SUFFIX, Project, figures_of, project_bytes
 from machine.pipeline.requests import STDOUT, Given, ModelRequest
@@ -132,12 +132,15 @@ def save(request: ModelRequest, out: Path) -> int:
         raise OutputError(f"output {out}: a project is a 3MF file: a name that ends in {SUFFIX} is expected")
     check_writable(out)
     check_model_files(request, (("project", out),))
-    decomposed = decompose_model(replace(request, copies=1, beside=()))
-    decomposition = decomposed.decomposition
-    check_stop_parts(request.stops, len(decomposition.parts))
-    picture = png_bytes(parts_together(decomposition, decomposed.profile, PICTURE_PX))
-    write_bytes(out, project_bytes(_project(request, decomposed), decomposed.plan, decomposition.mesh, picture))
-    count = len(decomposed.plan.parts) + 1
+    each = decompose_each(request, to_build=False)
+    first, *others = each.values()
+    decomposition = first.decomposition
+    if not others and request.copies == 1:  # else they count the parts of all
+        check_stop_parts(request.stops, len(decomposition.parts))
+    picture = png_bytes(parts_together(decomposition, first.profile, PICTURE_PX))
+    plans = [decomposed.plan for decomposed in each.values()]
+    write_bytes(out, project_bytes(_project(request, each), plans, decomposition.mesh, picture))
+    count = len(first.plan.parts) + 1
     command = shlex.join(["tiltprint", "export", str(out)])
     contents = (
         f"{request.name} {in_parts(count)}, {decomposition.residual_area_mm2:.0f} mm² need support, with its plan and profiles; "
@@ -147,25 +150,20 @@ def save(request: ModelRequest, out: Path) -> int:
     return 0
 
 
-def _project(request: ModelRequest, decomposed: Decomposed) -> Project:
-    decomposition, orientation = decomposed.decomposition, decomposed.plan.orientation
+def _project(request: ModelRequest, each: dict[str, Decomposed]) -> Project:
     names = {kind: name or DEFAULTS[kind] for kind, name in zip(DEFAULTS, request.profile_names, strict=True)}
-    files = {name: None if name.startswith(DEMO) else Path(name) for name in (request.model, *request.beside)}
-    beside = Counter(request.beside)
-    copies = request.copies * (1 + beside.pop(request.model, 0))
-    return Project(
-        name=request.name,
-        model=files[request.model],
-        given=Given(**names, settings=request.settings),
-        rotation=STANDING if orientation is None else orientation,
-        parts=len(decomposition.parts),
-        stops=request.stops,
-        copies=copies,
-        beside=tuple(
-            (name if files[name] is None else Path(name).name, files[name], count * request.copies)
-            for name, count in beside.items()
-        ),
-        figures=figures_of(decomposition.chosen),
-        plate=request.plate,
-        marks_in_plan=not request.own_marks,
-    )
+    given, counts = Given(**names, settings=request.settings), Counter((request.model, *request.beside))
+    first, *others = [
+        Project(
+            name=name if name.startswith(DEMO) else Path(name).name,
+            model=None if name.startswith(DEMO) else Path(name),
+            given=given,
+            rotation=decomposed.plan.orientation or STANDING,
+            parts=len(decomposed.decomposition.parts),
+            copies=request.copies * counts[name],
+            figures=figures_of(decomposed.decomposition.chosen),
+            marks_in_plan=not request.own_marks,
+        )
+        for name, decomposed in each.items()
+    ]
+    return replace(first, stops=request.stops, beside=tuple(others), plate=request.plate)

@@ -24,7 +24,7 @@ from profiles.errors import PlanError
 from profiles.frozen import Effect, Vector
 from profiles.messages import option
 from profiles.part_settings import PartSettings
-from profiles.profile import Profile
+from profiles.profile import Profile, with_part_settings
 
 USUAL = Given()
 MOST_STEPS = 200  # undo steps
@@ -39,8 +39,8 @@ class Bench:
     yet. rows: the front from which the cuts were chosen, with increasing numbers of parts; recommended: number of parts that the
     search prefers, 0: no search yet; priced: times and filament of the rows are those for this profile. locked: cuts that a
     search keeps and that cannot be moved. stops: pauses, each of which follows its part; copies: of the model on the plate;
-    beside: the other models there, each with its number of copies; all three remain until another model is opened. notes: those
-    of the search that found the rows.
+    beside: the other models there, with the same settings, except those of single parts; number: of models before this one on
+    the plate. These four remain until another model is opened. notes: those of the search that found the rows.
     """
 
     profile: Profile
@@ -55,13 +55,20 @@ class Bench:
     priced: bool = True
     stops: tuple[Stop, ...] = ()
     copies: int = 1
-    beside: tuple[tuple[Model, int], ...] = ()
+    beside: "tuple[Bench, ...]" = ()
+    number: int = 0
     notes: tuple[str, ...] = ()
 
     @property
     def parts(self) -> int:
         """Number of parts; 0: not cut yet."""
         return 0 if self.cuts is None else len(self.cuts) + 1
+
+    @property
+    def plate(self) -> "tuple[Bench, ...]":
+        """All models on the plate in their order, this one included."""
+        alone = replace(self, stops=(), beside=(), number=0) if self.beside else self
+        return *self.beside[: self.number], alone, *self.beside[self.number :]
 
     @property
     def planned(self) -> bool:
@@ -93,7 +100,7 @@ class Bench:
     @property
     def printed(self) -> tuple[object, ...]:
         """Everything that determines the print."""
-        return *self.shaped, self.stops, self.copies, self.beside
+        return tuple((*each.shaped, each.copies) for each in self.plate), self.stops
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +149,7 @@ def _nearest_steps(steps: tuple[Step, ...]) -> tuple[Step, ...]:
     """The nearest steps whose models fit into memory; always includes the nearest one."""
     models, faces = set[Model](), 0
     for back, step in enumerate(reversed(steps)):
-        for model in (step.bench.model, *(other for other, _ in step.bench.beside)):
+        for model in (each.model for each in step.bench.plate):
             if model is not None and model not in models:
                 models.add(model)
                 faces += model.faces
@@ -179,24 +186,32 @@ def with_model(bench: Bench, model: Model) -> Bench:
 def with_model_anew(bench: Bench, model: Model | None) -> Bench:
     """The bench with the same model read, turned or cut again: keeps pauses, the rest of the plate and the settings of part 1."""
     profile = renumbered(bench.profile, bench.cuts or (), ())
-    kept = replace(emptied(bench), stops=bench.stops, copies=bench.copies, beside=bench.beside)
+    kept = replace(emptied(bench), stops=bench.stops, copies=bench.copies, beside=bench.beside, number=bench.number)
     return replace(kept, model=model, profile=profile)
 
 
-def with_beside(bench: Bench, beside: tuple[tuple[Model, int], ...]) -> Bench:
+def with_beside(bench: Bench, beside: tuple[Bench, ...]) -> Bench:
     """Replace the other models on the plate. Raises PlanError for a name that occurs twice, because messages and the command
     line identify models by their names, and for more models than a plate may have."""
     assert bench.model is not None
     names = {bench.model.name}
-    for model, _ in beside:
-        if model.name in names:
-            raise PlanError(f"{model.name} is on the plate already: set its number of copies to print more")
-        names.add(model.name)
+    for other in beside:
+        assert other.model is not None
+        if other.model.name in names:
+            raise PlanError(f"{other.model.name} is on the plate already: set its number of copies to print more")
+        names.add(other.model.name)
     if beside:
         check_first_plate(bench.model)
-    if (count := bench.copies + sum(copies for _, copies in beside)) > MOST_COPIES:
+    if (count := bench.copies + sum(other.copies for other in beside)) > MOST_COPIES:
         raise PlanError(f"{count} models are to stand on the plate: {MOST_COPIES} at most are allowed")
     return replace(bench, beside=beside)
+
+
+def with_other_in_work(bench: Bench, index: int) -> Bench:
+    """The bench to work on one of the other models, which changes neither the plate nor its print."""
+    plate, number = bench.plate, index + (index >= bench.number)
+    others = (*plate[:number], *plate[number + 1 :])
+    return replace(plate[number], stops=bench.stops, beside=others, number=number)
 
 
 def check_first_plate(model: Model) -> None:
@@ -284,9 +299,13 @@ def with_zones(bench: Bench, zones: Zones) -> Bench:
 
 
 def with_profile(bench: Bench, given: Given, profile: Profile) -> Bench:
-    """Replace the profile. Drops the front if a search might find another one, or its times and filament if they might change.
-    The planes stay; if the pedestal changes, planes and zones move with the model."""
-    changed = replace(bench, given=given, profile=profile)
+    """Replace the profile, also that of the other models. Drops the front if a search might find another one, or its times and
+    filament if they might change. The planes stay; if the pedestal changes, planes and zones move with the model. Raises
+    ProfileError if the settings of a part of another model do not go with it."""
+    others = tuple(
+        with_profile(other, given, with_part_settings(profile.of_all_parts, other.profile.parts)) for other in bench.beside
+    )
+    changed = replace(bench, given=given, profile=profile, beside=others)
     if profile.search.pedestal_mm != bench.profile.search.pedestal_mm:
         changed = _with_places_of(changed, bench)
     effect = effect_of_change(bench.profile, profile)

@@ -13,7 +13,7 @@ from pydantic import Field
 
 from machine.pipeline.requests import MOST_COPIES
 from machine.planning.stops import check_stop_heights, parse_stops
-from machine.workbench.bench.bench import Bench, laid_down, with_beside, with_cuts, with_rotation
+from machine.workbench.bench.bench import Bench, laid_down, with_beside, with_cuts, with_other_in_work, with_rotation
 from machine.workbench.bench.part_settings import with_part_setting, without_part_settings
 from machine.workbench.bench.values import Direction, Mm, Point, Rotation, check_number, with_value
 from mdp.directions.orientation import set_on_plate
@@ -118,10 +118,18 @@ def copies(bench: Bench, *, count: int) -> Bench:
 def beside(bench: Bench, *, number: int, count: int) -> Bench:
     """Set the number of copies of another model on the plate, numbered from 1; 0 removes it."""
     index = check_number("number", number, 1, len(bench.beside)) - 1
-    model, before = bench.beside[index]
+    other = bench.beside[index]
     check_number(option("copies"), count, 0, MOST_COPIES)
-    left = ((model, count),) if count else ()
-    return bench if count == before else with_beside(bench, (*bench.beside[:index], *left, *bench.beside[index + 1 :]))
+    if count == other.copies:
+        return bench
+    left = (replace(other, copies=count),) if count else ()
+    changed = with_beside(bench, (*bench.beside[:index], *left, *bench.beside[index + 1 :]))
+    return replace(changed, number=bench.number - (not count and index < bench.number))
+
+
+def work_on(bench: Bench, *, number: int) -> Bench:
+    """Turn, cut and mark another model on the plate, numbered from 1, from now on."""
+    return with_other_in_work(bench, check_number("number", number, 1, len(bench.beside)) - 1)
 
 
 def _part(bench: Bench, part: int) -> int:
@@ -325,6 +333,7 @@ CHANGES: dict[str, tuple[Callable[..., Bench], str]] = {
     "remove_stop": (remove_stop, "take a pause away"),
     "copies": (copies, "print another number of copies"),
     "beside": (beside, "change the models on the plate"),
+    "work_on": (work_on, "work on another model"),
 }
 # Commands that return other cuts.
 EDITS: dict[str, Callable[..., Edit]] = {"add": add, "move": move, "limb": limb, "remove": remove, "reorder": reorder}

@@ -251,21 +251,22 @@ def _sentence(model: type[Frozen]) -> str:
 
 
 def file_stem(bench: Bench) -> str:
-    """File name after the model."""
-    name = "" if bench.model is None else Path(bench.model.name.removeprefix("demo:")).stem
+    """File name after the first model on the plate."""
+    first = bench.plate[0].model
+    name = "" if first is None else Path(first.name.removeprefix("demo:")).stem
     return plain_name(name) or "model"
 
 
 def export_command(bench: Bench) -> str:
     """The `export` command for a shell; "" without a model. Cuts, orientation, marks and part settings are in the plan that the
-    workbench saves."""
+    workbench saves, those of several models in the project."""
     if bench.model is None:
         return ""
     given, stem = bench.given, file_stem(bench)
+    if bench.beside:
+        return join(["tiltprint", "export", f"{stem}.3mf", "-o", f"{stem}.gcode"])
     named = [(kind, getattr(given, kind)) for kind in DEFAULTS if getattr(given, kind) != DEFAULTS[kind]]
-    plate = [(bench.model.name, bench.copies), *((model.name, copies) for model, copies in bench.beside)]
-    models = [f"{name}:{copies}" if bench.beside and copies > 1 else name for name, copies in plate]
-    words = ["tiltprint", "export", *models, *(word for kind, name in named for word in (f"--{kind}", name))]
+    words = ["tiltprint", "export", bench.model.name, *(word for kind, name in named for word in (f"--{kind}", name))]
     settings = list(given.settings)
     if not bench.planned and bench.turned is not None:
         settings = [setting for setting in settings if key_of(setting) != "process.rotate_deg"]
@@ -279,7 +280,7 @@ def export_command(bench: Bench) -> str:
         words += ["--parts", "1", "--as-is"]
         for own in bench.profile.parts:
             words += ["--part", option(own)]
-    if bench.copies != 1 and not bench.beside:
+    if bench.copies != 1:
         words += ["--copies", str(bench.copies)]
     words += [word for stop in bench.stops for word in (f"--{stop.option}", stop.at)]
     return join([*words, "-o", f"{stem}.gcode"])

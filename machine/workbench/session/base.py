@@ -13,10 +13,7 @@ from machine.crash import bug_in_words
 from machine.workbench.bench.bench import Bench, History, Step
 from machine.workbench.work.folders import Received
 from machine.workbench.work.worker_pool import CLOSED, TaskQueue, WorkerPools
-from profiles.effect import effect_of_change
 from profiles.errors import UserError
-from profiles.files import modified_s
-from profiles.frozen import Effect
 from profiles.messages import terminal_words
 
 WAITING = "waiting until the work of other benches is done"
@@ -62,11 +59,6 @@ class Observable:
             await self._changed.wait()
 
 
-def _written(file: Path) -> float:
-    """Time of a file's last change, 0 without one."""
-    return modified_s(file) if file.exists() else 0.0
-
-
 async def in_loop(loop: asyncio.AbstractEventLoop, work: Coroutine[Any, Any, Value]) -> Value:
     """Run a coroutine in another event loop and return its result; cancelling the wait cancels the coroutine."""
     return await asyncio.wrap_future(asyncio.run_coroutine_threadsafe(work, loop))
@@ -79,8 +71,7 @@ class SessionBase(Observable):
     problems: what could not be done last, by the page that wanted it, "" for all pages; answers: to the last commands that a page
     gave a name, by that: why they were refused, "" for those that are done; busy: what the pages wait for; note: what the last
     command has changed beside what it was for; quick, long, hand: its tasks in the pools; aside: tasks that no one waits for;
-    received: the files of its pages; others: file of the parts of the other models on the plate (see work.plate); others_version:
-    how often a task has added some; followers: called after every change of the bench.
+    received: the files of its pages; followers: called after every change of the bench.
     """
 
     def __init__(self, bench: Bench, pools: WorkerPools) -> None:
@@ -95,9 +86,6 @@ class SessionBase(Observable):
         self.turn = asyncio.Lock()  # fair: first come, first served
         self.received = Received()
         self._files = count(1)
-        self.others, self.others_version = self.new_file(), 0
-        self._others_profile = bench.profile
-        self.followers.append(self._drop_others)
 
     @property
     def bench(self) -> Bench:
@@ -111,26 +99,6 @@ class SessionBase(Observable):
     def new_file(self) -> Path:
         """A path for a task's output, deleted with the session at the latest."""
         return self.received.path / f"made-{next(self._files)}"
-
-    def _drop_others(self) -> None:
-        """Begin another file of the other models' parts after a change of the profile that may lead to other parts."""
-        profile, self._others_profile = self._others_profile, self.bench.profile
-        if effect_of_change(profile, self._others_profile) > Effect.NONE:
-            self.others.unlink(missing_ok=True)
-            self.others = self.new_file()
-
-    @contextmanager
-    def cutting_others(self) -> Iterator[Path]:
-        """The file of the other models' parts, for a task that adds those that it lacks; then they are placed again, as they are
-        cut now, also if the task fails or is stopped."""
-        others = self.others
-        before = _written(others)
-        try:
-            yield others
-        finally:
-            if _written(others) != before and not self.closed:
-                self.others_version += 1
-                self.become(self.history)
 
     def start(self, work: Coroutine[Any, Any, None], ask: object = None) -> "asyncio.Task[None]":
         """Start work in the background; its error becomes the sentence that pages show. ask: name of its command."""

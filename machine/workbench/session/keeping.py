@@ -16,6 +16,7 @@ from profiles.errors import PlanError, UserError, reason
 from profiles.files import lock_folder
 
 AFTER_S = 1.0  # so that dragging causes one write
+Plate = tuple[Path, int | None]  # a model's file, and its plate in that
 OPEN_ELSEWHERE = "this work is no longer kept, or another page has opened it"
 
 
@@ -29,7 +30,7 @@ class Keeping:
         self._kept: weakref.ref[Bench] | None = None
         self._saving: asyncio.Task[None] | None = None
         self._writing, self._ended = asyncio.Lock(), asyncio.Event()
-        self._work: tuple[Path, int | None] | None = None  # file and plate of the saved model, which identify its work
+        self._work: frozenset[Plate] = frozenset()  # files and plates of the saved models, which identify their work
         self.released = 0  # how often work of this session became earlier work, or was opened again
         self._opening = False
         self._trouble = ""
@@ -101,7 +102,7 @@ class Keeping:
             return ""
         async with self._writing:
             self._release()
-            self._work = None
+            self._work = frozenset()
         cut = f", cut into {bench.parts} parts," if bench.parts > 1 else ""
         return f"{bench.model.name}{cut} is kept under Earlier work (Undo brings it back)"
 
@@ -127,9 +128,10 @@ class Keeping:
     def _write(self, bench: Bench) -> str:
         """Write a bench; returns why that failed, or ""."""
         try:
-            if _identity(bench) != self._work:  # another model, or none: the previous one's save stays
+            models = _identity(bench)
+            if models.isdisjoint(self._work):  # other models, or none: the save of the previous ones stays
                 self._release()
-                self._work = _identity(bench)
+            self._work = models
             if bench.model is None:
                 return ""
             if self._folder is None:
@@ -145,6 +147,6 @@ class Keeping:
         return ""
 
 
-def _identity(bench: Bench) -> tuple[Path, int | None] | None:
-    """The file and the plate of the bench's model; None: there is none."""
-    return None if bench.model is None else (bench.model.path, bench.model.plate)
+def _identity(bench: Bench) -> frozenset[Plate]:
+    """The file and the plate of each of the bench's models."""
+    return frozenset((each.model.path, each.model.plate) for each in bench.plate if each.model is not None)

@@ -4,6 +4,7 @@ import asyncio
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from machine.program import Alternative
 from machine.workbench.bench.bench import Bench, locked_plan, rows_to_price, with_front, with_prices, with_rotation
 from machine.workbench.session.base import WAITING, Derived, SessionBase
 from machine.workbench.work.cutting import Found, Searched, find_parts, price_cuts, price_row
+from machine.workbench.work.plate import naming_model
 from machine.workbench.work.slices import Sliced, SlicesSoFar, compare_bench, slice_bench
 from mdp.decomposition import FrontRow
 from mdp.ranking.ranker import CLASSIC
@@ -23,8 +25,9 @@ ENDED = "slicing was stopped, for the model on the workbench has changed: slice 
 REPLACED = "your planes were replaced: Undo brings them back"
 
 
-class Finding(Derived[Found]):
-    """Search for parts, cancelled when the model, its orientation, settings, marks or locked planes change.
+class Finding(Derived[tuple[Found, ...]]):
+    """Search for the parts of the bench's model, then of each other model on the plate that is not cut; cancelled when one of
+    these, its orientation, settings, marks or locked planes change.
 
     laid: the rotations before and after it."""
 
@@ -33,8 +36,8 @@ class Finding(Derived[Found]):
         self._how = True, CLASSIC
         super().__init__(
             session,
-            lambda bench: None if bench.model is None else (bench.sought, locked_plan(bench).parts),
-            lambda bench: session.long.run(find_parts, bench, *self._how, tell=self.teller()),
+            lambda bench: None if bench.model is None else (bench.sought, locked_plan(bench).parts, _uncut(bench)),
+            self._find,
             by_itself=False,
             interrupts=True,
             accept=self._accept_found,
@@ -45,6 +48,23 @@ class Finding(Derived[Found]):
         if self.progress is None:
             self._how = orient, ranker
             self.begin(Searched(WAITING if self._session.long.pool.full else "beginning"))
+
+    async def _find(self, bench: Bench) -> tuple[Found, ...]:
+        tell, found = self.teller(), list[Found]()
+        best: FrontRow | None = None
+
+        def follow_other(name: str, searched: Searched) -> None:
+            tell(Searched(f"{name}: {searched.text}", best))
+
+        found.append(await self._session.long.run(find_parts, bench, *self._how, tell=tell))
+        if found[0].turn is None:
+            best = next(row for row in found[0].front if row.chosen)
+        for other in bench.beside:
+            if other.cuts is None and other.model is not None:
+                follow = partial(follow_other, other.model.name)
+                with naming_model(other):
+                    found.append(await self._session.long.run(find_parts, other, *self._how, tell=follow))
+        return tuple(found)
 
     def interrupted(self) -> None:
         """Start a process for the next search."""
@@ -61,12 +81,23 @@ class Finding(Derived[Found]):
         used = f"The search was stopped; the best so far is used: {best.parts} parts"
         return f"{used}; {REPLACED}." if _replaces_planes(now, taken) else f"{used}."
 
-    def _accept_found(self, found: Found) -> None:
-        now = self._session.bench
-        laid = now if found.turn is None else with_rotation(now, (found.turn @ np.array(now.rotation)).tolist())
-        self.laid = None if laid is now else (now.rotation, laid.rotation)
-        after = with_front(laid, found.front, found.notes)
+    def _accept_found(self, found: tuple[Found, ...]) -> None:
+        now, (own, *further) = self._session.bench, found
+        of_others = iter(further)
+        others = tuple(_with_found(other, next(of_others)) if other.cuts is None else other for other in now.beside)
+        after = replace(_with_found(now, own), beside=others)
+        self.laid = None if after.rotation == now.rotation else (now.rotation, after.rotation)
         self._session.do("find parts", after, REPLACED if _replaces_planes(now, after) else "")
+
+
+def _uncut(bench: Bench) -> tuple[object, ...]:
+    """Everything that determines the parts found for the other models, which are not cut yet."""
+    return tuple(other.sought for other in bench.beside if other.cuts is None)
+
+
+def _with_found(bench: Bench, found: Found) -> Bench:
+    laid = bench if found.turn is None else with_rotation(bench, (found.turn @ np.array(bench.rotation)).tolist())
+    return with_front(laid, found.front, found.notes)
 
 
 def _replaces_planes(now: Bench, after: Bench) -> bool:
@@ -131,8 +162,9 @@ class Slicing(Derived[Slices]):
         super().__init__(session, lambda bench: bench.printed, self._slice, by_itself=False, interrupts=True)
 
     def latest(self) -> Slices | None:
-        """The last slices of the model on the bench, even if it has been turned, cut or set differently since."""
-        return self.done if self.done is not None and self.done.bench.model is self._session.bench.model else None
+        """The last slices of a model on the plate, even if it has been turned, cut or set differently since."""
+        models = {each.model for each in self._session.bench.plate}
+        return self.done if self.done is not None and any(each.model in models for each in self.done.bench.plate) else None
 
     @property
     def out_of_date(self) -> bool:
@@ -176,8 +208,7 @@ class Slicing(Derived[Slices]):
             tell(replace(so_far, walls=walls))
 
         page, gcode = self._session.new_file(), self._session.new_file()
-        with self._session.cutting_others() as others:
-            sliced = await self._session.long.run(slice_bench, bench, others, page, gcode, tell=follow)
+        sliced = await self._session.long.run(slice_bench, bench, page, gcode, tell=follow)
         if self.done is not None:
             self.done.sliced.page.unlink(missing_ok=True)
             self.done.sliced.gcode.unlink(missing_ok=True)
@@ -198,8 +229,7 @@ class Comparing(Derived[tuple[Alternative, ...]]):
         )
 
     async def _compare(self, bench: Bench) -> tuple[Alternative, ...]:
-        with self._session.cutting_others() as others:
-            return await self._session.long.run(compare_bench, bench, others, tell=self.teller())
+        return await self._session.long.run(compare_bench, bench, tell=self.teller())
 
     def rows(self) -> tuple[Alternative, ...]:
         """The last slices, then their model in one piece; () if these slices have not been compared."""

@@ -106,12 +106,12 @@ def plated_of(session: SessionBase) -> Derived[Plated]:
     def decides(bench: Bench) -> tuple[object, ...] | None:
         if bench.model is None or (bench.copies == 1 and not bench.beside):
             return None
-        return *bench.shaped, bench.copies, bench.beside, session.others_version if bench.beside else 0
+        return bench.printed[0], bench.number
 
     async def find(bench: Bench) -> Plated:
         await asyncio.sleep(REST_S)
         drawn = session.new_file()
-        plated = await session.aside.run(put_on_plate, bench, session.others, drawn)
+        plated = await session.aside.run(put_on_plate, bench, drawn)
         finalize(plated, drawn.unlink, missing_ok=True)
         return plated
 

@@ -22,6 +22,7 @@ from machine.workbench.bench.bench import (
     with_beside,
     with_model,
     with_model_turned_as_read,
+    with_other_in_work,
     with_plan,
     with_prices,
     with_profile,
@@ -50,6 +51,7 @@ from mdp.zone import NO_ZONES
 from profiles.effect import effect_of_change
 from profiles.errors import CutError, MeshError, PlanError
 from profiles.frozen import Effect
+from profiles.process import Process
 from profiles.profile import Profile
 
 MOST_SESSIONS = 20
@@ -113,7 +115,7 @@ class Session(SessionBase):
     def unsliceable(self) -> str:
         """Why what is on the bench cannot be sliced, as far as it is known; "" if it can."""
         bench, standing, plated = self.bench, self.standing.result, self.plated.result
-        known = self.trials.unsliceable() or (plated.problem if plated is not None and plated.is_sure else "")
+        known = self.trials.unsliceable() or ("" if plated is None else plated.problem)
         return known or ("" if bench.cuts or standing is None else standing.problem)
 
     def warm(self) -> None:
@@ -159,7 +161,7 @@ class Session(SessionBase):
         bench = bench or self.bench
         with self.waiting(f"reading {name}"):
             model = await self._read(path, name, bench.profile)
-        self.do(f"add {name} to the plate", with_beside(bench, (*bench.beside, (model, 1))))
+        self.do(f"add {name} to the plate", with_beside(bench, (*bench.beside, with_model(bench, model))))
 
     async def _replace(self, word: str, bench: Bench, note: str = "") -> None:
         """Take other work onto the bench, after what lies there is kept. note: a sentence about that work."""
@@ -254,21 +256,25 @@ class Session(SessionBase):
         self.readiness.load()
         profile = profile_as_given(project.given, self.bench.profile.of_all_parts)
         check_block(profile, "")
-        plan = None if project.plan is None else replace(_read_plan(project.plan), name="")
         with self.waiting(f"reading {project.name}"):
-            model = await self._read(await self._copy_of(project.name, project.model), project.name, profile, project.plate)
-            others = [(name, await self._copy_of(name, file), copies) for name, file, copies in project.beside]
-            beside = tuple([(await self._read(path, name, profile), copies) for name, path, copies in others])
-            uncut = with_model(Bench(profile, given=project.given), model)
-            bench = with_rotation(uncut, project.rotation)
-            if plan is not None:
-                marks = NO_ZONES if project.marks_in_plan else bench.zones
-                rows, _ = await self._measured(uncut, plan, profile, project.recommended)
-                bench = with_rotation(with_plan(uncut, plan, rows, with_plan_settings(profile, plan)), project.rotation)
-                bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
+            first, *others = [await self._bench_of_model(each, profile) for each in (project, *project.beside)]
+        bench = with_beside(replace(first, stops=project.stops), tuple(others))
+        return with_other_in_work(bench, project.worked_on - 1) if project.worked_on else bench
+
+    async def _bench_of_model(self, project: Project, profile: Profile) -> Bench:
+        """A bench for one of the models of a project. Raises UserError."""
+        plan = None if project.plan is None else replace(_read_plan(project.plan), name="")
+        model = await self._read(await self._copy_of(project.name, project.model), project.name, profile, project.plate)
+        uncut = with_model(Bench(profile, given=project.given), model)
+        bench = with_rotation(uncut, project.rotation)
+        if plan is not None:
+            marks = NO_ZONES if project.marks_in_plan else bench.zones
+            rows, _ = await self._measured(uncut, plan, profile, project.recommended)
+            bench = with_rotation(with_plan(uncut, plan, rows, with_plan_settings(profile, plan)), project.rotation)
+            bench = replace(bench, zones=marks.beside(bench.zones)) if marks != NO_ZONES else bench
         bench = bench if project.parts else replace(bench, cuts=None)
         locked = frozenset(part for k, part in enumerate(bench.cuts or ()) if k in project.locked)
-        bench = with_beside(replace(bench, locked=locked, stops=project.stops, copies=project.copies), beside)
+        bench = replace(bench, locked=locked, copies=project.copies)
         return with_prices(replace(bench, recommended=project.recommended), {}) if bench.rows else bench
 
     async def _copy_of(self, name: str, model: Path | None) -> Path:
@@ -375,13 +381,10 @@ class Session(SessionBase):
         new, old = bench.profile.process, before.profile.process
         if model is not None and (new.scale, new.rotate_deg) != (old.scale, old.rotate_deg):
             with self.waiting(f"reading {model.name}"):
-                model = await self._read(model.path, model.name, bench.profile, model.plate)
-                others = [(await self._read(other.path, other.name, bench.profile), copies) for other, copies in bench.beside]
-            bench = replace(bench, beside=tuple(others))
+                others = [await self._read_again(other, old) for other in bench.beside]
+                bench = replace(await self._read_again(bench, old), beside=tuple(others))
             if new.rotate_deg != old.rotate_deg:
-                turn = turned_by(new.rotate_deg) @ turned_by(old.rotate_deg).T
-                return with_model_turned_as_read(bench, model, turn, new.scale / old.scale), ""
-            bench = with_scaled_model(bench, model, new.scale / old.scale)
+                return bench, ""
         effect = effect_of_change(before.profile, bench.profile)
         if effect == Effect.REACH and bench.rows:
             rows = [row for row in bench.rows if not (await self.trials.attempt(bench, planned_parts(row))).rejected]
@@ -389,6 +392,16 @@ class Session(SessionBase):
         if bench.cuts is None or effect < Effect.REACH:
             return bench, ""
         return bench, await self.trials.recheck(bench)
+
+    async def _read_again(self, bench: Bench, before: Process) -> Bench:
+        """The bench with its model scaled and turned as its profile says. before: how it was read. Raises UserError."""
+        assert bench.model is not None
+        process = bench.profile.process
+        model = await self._read(bench.model.path, bench.model.name, bench.profile, bench.model.plate)
+        if process.rotate_deg == before.rotate_deg:
+            return with_scaled_model(bench, model, process.scale / before.scale)
+        turn = turned_by(process.rotate_deg) @ turned_by(before.rotate_deg).T
+        return with_model_turned_as_read(bench, model, turn, process.scale / before.scale)
 
     async def _read(self, path: Path, name: str, profile: Profile, plate: int | None = None, asks: bool = False) -> Model:
         """The model of a file, whose mesh file exists as long as the model. asks: ask the page for the unit if the size suggests

@@ -239,7 +239,7 @@ def _parts_state(session: Session) -> dict[str, Any]:
 def _plate_state(session: Session) -> dict[str, Any]:
     """All models on the plate, where they stand, and the pauses of their print."""
     bench, plated = session.bench, session.plated.result
-    count = bench.copies + sum(copies for _, copies in bench.beside)
+    count = sum(each.copies for each in bench.plate)
     if count == 1:
         plated, told = Plated(), ""
     elif plated is None:
@@ -256,13 +256,20 @@ def _plate_state(session: Session) -> dict[str, Any]:
         "copies_mm": plated and [[round(x, 3), round(y, 3)] for x, y in plated.copies_mm],
         "copies_told": told,
         "misplaced": plated is not None and plated.problem != "",
-        "is_sure": plated is None or plated.is_sure,
         "plate_told": _extent(bench.profile.machine.table),
-        "beside": [{"name": other.name, "copies": copies, "size_mm": other.size_mm} for other, copies in bench.beside],
+        "beside": [_other(other) for other in bench.beside],
+        "number": bench.number,
+        "other_boxes": plated.other_boxes if plated else [],
         "others": plated and plated.others_key,
         "addable": session.addable,
         "stops": [_stop(stop) for stop in bench.stops],
     }
+
+
+def _other(bench: Bench) -> dict[str, Any]:
+    """Another model on the plate."""
+    assert bench.model is not None
+    return {"name": bench.model.name, "copies": bench.copies, "parts": bench.parts}
 
 
 def _savable(session: Session) -> dict[str, tuple[str, str]]:

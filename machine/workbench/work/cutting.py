@@ -165,11 +165,12 @@ def make_plan(tell: Tell, bench: Bench) -> str:
 
 def make_project(tell: Tell, bench: Bench, out: Path) -> None:
     """Write the project of the bench. Its picture shows the parts, or the whole model if they cannot be cut."""
-    check_stop_parts(bench.stops, max(bench.parts, 1))
-    plan, cut = _saved_plan(bench)
+    if not bench.beside:
+        check_stop_parts(bench.stops, max(bench.parts, 1))
+    plans, models = zip(*map(_saved_plan, bench.plate), strict=True)
     compilers.wait_for(compilers.PICTURES)
-    picture = png_bytes(parts_together(cut, bench.profile, PICTURE_PX))
-    out.write_bytes(project_bytes(work_of(bench), plan, cut.mesh, picture))
+    picture = png_bytes(parts_together(models[0], bench.profile, PICTURE_PX))
+    out.write_bytes(project_bytes(work_of(bench), plans, models[0].mesh, picture))
 
 
 def _saved_plan(bench: Bench) -> tuple[PlanFile, Decomposition]:

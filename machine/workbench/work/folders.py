@@ -13,11 +13,12 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from secrets import token_hex
 from weakref import finalize
 
-from machine.pipeline.project import PLAN, Project, figures_of, write_folder
+from machine.pipeline.project import Project, figures_of, plan_file, write_folder
 from machine.pipeline.project_record import RECORD
 from machine.workbench.bench.bench import Bench, plan_of_bench
 from machine.workbench.bench.model import Model
@@ -127,11 +128,17 @@ def new_folder() -> Path:
 
 def write_work(folder: Path, bench: Bench) -> None:
     """Save a bench with a model. Raises OSError; the previous save then still exists."""
-    write_folder(folder, work_of(bench), plan_of_bench(bench, PLAN) if bench.planned else None)
+    plans = [plan_of_bench(each, plan_file(k)) if bench.planned else None for k, each in enumerate(bench.plate)]
+    write_folder(folder, work_of(bench), plans)
 
 
 def work_of(bench: Bench) -> Project:
     """The project of a bench with a model; it refers to its files."""
+    first, *others = map(_of_model, bench.plate)
+    return replace(first, stops=bench.stops, beside=tuple(others), worked_on=bench.number)
+
+
+def _of_model(bench: Bench) -> Project:
     model = bench.model
     assert model is not None
     return Project(
@@ -141,9 +148,7 @@ def work_of(bench: Bench) -> Project:
         rotation=bench.rotation,
         parts=bench.parts,
         locked=tuple(k for k, part in enumerate(bench.cuts or ()) if part in bench.locked),
-        stops=bench.stops,
         copies=bench.copies,
-        beside=tuple((other.name, _own_file(other), copies) for other, copies in bench.beside),
         recommended=bench.recommended,
         plate=model.plate,
         marks_in_plan=True,

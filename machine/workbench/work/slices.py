@@ -93,10 +93,10 @@ class Sliced:
         return errors_of(self.findings)
 
 
-def slice_bench(tell: Tell, bench: Bench, others: Path, page: Path, gcode: Path) -> Sliced:
+def slice_bench(tell: Tell, bench: Bench, page: Path, gcode: Path) -> Sliced:
     """Slice the bench, write page and G-code to these files and dry-run them, as `export --plan` does with pauses and copies; an
-    uncut model in one piece. others: see work.plate."""
-    decomposition, profile = plated(bench, others, lambda text: tell(SlicesSoFar(text)))
+    uncut model in one piece."""
+    decomposition, profile = plated(bench)
     standing = standing_at(decomposition, profile.process.place_mm)
     shares: tuple[float, ...] = ()
     ready: set[int] = set()
@@ -160,9 +160,9 @@ def open_gcode(tell: Tell, request: ModelRequest, page: Path, gcode: Path) -> Sl
     )
 
 
-def compare_bench(tell: Tell, bench: Bench, others: Path) -> tuple[Alternative, ...]:
+def compare_bench(tell: Tell, bench: Bench) -> tuple[Alternative, ...]:
     """Costs of the models on the plate in one piece, as they stand and in their best orientations, as in `export --compare`."""
-    decomposition, profile = plated(bench, others, tell)
+    decomposition, profile = plated(bench)
     return in_one_part(decomposition, profile, lambda text, share=None: tell(text))
 
 

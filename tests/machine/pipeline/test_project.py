@@ -89,7 +89,7 @@ def test_a_project_of_several_models_has_the_copies_of_each(folder: Path) -> Non
     assert save(plate, folder / "plate.3mf") == 0
     (folder / "open").mkdir()
     project = unpack(folder / "plate.3mf", folder / "open")
-    assert (project.copies, [(name, count) for name, _, count in project.beside]) == (2, [("box.stl", 6)])
+    assert (project.copies, [(other.name, other.copies) for other in project.beside]) == (2, [("box.stl", 6)])
 
 
 @pytest.mark.parametrize(
@@ -140,7 +140,7 @@ def test_other_programs_read_the_oriented_model_and_its_thumbnail() -> None:
 def test_a_project_of_the_workbench_that_is_saved_again_still_says_that_its_plan_has_all_marks() -> None:
     project = Project("tee.stl", Path("tee.stl"), Given(), parts=1, marks_in_plan=True)
     plan = PlanFile("tee.stl", orientation=STANDING)
-    Path("bench.3mf").write_bytes(project_bytes(project, plan, tee(), b""))
+    Path("bench.3mf").write_bytes(project_bytes(project, [plan], tee(), b""))
     run("save", "bench.3mf", "-o", "again.3mf")
     project_again = open_project("again.3mf")
     assert project_again is not None
@@ -274,7 +274,7 @@ def test_a_model_name_with_unusual_characters_is_kept() -> None:
         ("beside", [["box.stl", "", 1]], "work.json: model is missing"),
         ("beside", [["box.stl", "box.stl", 1]], "work.json: model is 'box.stl': a file model-... of the project is expected"),
         ("beside", [["tee.stl", "", 1]], "beside names tee.stl next to tee.stl: each model must occur once"),
-        ("beside", [["demo:tree", "", 0]], "work.json: beside.0.2 is 0: it must be"),
+        ("beside", [["demo:tree", "", 0]], "work.json: beside.0.copies is 0: it must be"),
         ("beside", [["../box.stl", "", 1]], "name is '../box.stl': it must be the name of a file"),
         ("plan", False, "work.json: plan is false: a project has one"),
         ("marks_in_plan", 3, "marks_in_plan is 3: it must be true or false"),

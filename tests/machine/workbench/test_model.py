@@ -140,7 +140,7 @@ def project(path: Path, mesh: Mesh, given: Given, plan: PlanFile | None = None) 
     """A project file with its model beside it."""
     (path.parent / "own.stl").write_bytes(stl(mesh))
     made = Project("own.stl", path.parent / "own.stl", given, parts=1)
-    path.write_bytes(project_bytes(made, plan or PlanFile("own.stl"), mesh, b""))
+    path.write_bytes(project_bytes(made, [plan or PlanFile("own.stl")], mesh, b""))
     return path
 
 
@@ -197,7 +197,7 @@ def standing(mesh: Mesh, turns_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
 def plated(bench: Bench) -> Plated:
     """The plate of a bench; the folder of its files is removed afterwards."""
     with TemporaryDirectory() as folder:
-        return put_on_plate(lambda report: None, bench, Path(folder) / "others", Path(folder) / "drawn")
+        return put_on_plate(lambda report: None, bench, Path(folder) / "drawn")
 
 
 # A tee is 10 mm thick: its bar of 40 mm extends beyond its stem by 15 mm at each side; along its thickness its area is 700 mm2.

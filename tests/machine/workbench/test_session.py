@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.pipeline.requests import Given
-from machine.workbench.bench.bench import Bench, with_beside, with_cuts, with_front, with_profile
+from machine.workbench.bench.bench import Bench, with_cuts, with_front, with_profile
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import obey, redo, undo
 from machine.workbench.session.session import Session, Workbench
@@ -676,7 +676,7 @@ def test_the_first_plate_of_a_file_can_be_added_instead_also_after_another_one_w
     bench = when_done(work).bench
     assert offered == ["", "b.3mf"]
     assert bench.model is not None
-    assert (bench.model.name, [other.name for other, _ in bench.beside]) == ("a", ["b.3mf"])
+    assert (bench.model.name, [other.model and other.model.name for other in bench.beside]) == ("a", ["b.3mf"])
 
 
 def test_a_demo_that_is_cut_by_its_plan_says_too_that_the_work_before_it_is_kept(
@@ -722,37 +722,6 @@ def test_slices_do_not_wait_for_prices_of_planes_or_settings_that_have_changed_s
         session._prices.stop()
 
     when_done(work)
-
-
-def test_the_other_models_stay_in_the_picture_while_a_task_cuts_them_and_are_placed_anew_once_it_has() -> None:
-    stood: list[bool] = []
-
-    async def work(session: Session) -> None:
-        async def cut(task: Any, bench: Bench, others: Path, *given: Any, **more: Any) -> Any:
-            others.write_bytes(b"the parts of the other models")
-            session.notify()
-            stood.append(session.plated.result is not None)
-            await asyncio.sleep(0)
-            return ()
-
-        async def put(task: Any, *given: Any) -> Plated:
-            return Plated()
-
-        session.long.run = cut  # type: ignore[assignment, method-assign]
-        session.aside.run = put  # type: ignore[assignment, method-assign]
-        session.do("add b", with_beside(session.bench, ((model("b"), 1),)))
-        await session.plated.wait()
-        before = session.plated.number
-        obey(session, {"do": "slice"})
-        await settled(session)
-        await session.plated.wait()
-        obey(session, {"do": "compare"})
-        await settled(session)
-        await session.plated.wait()
-        stood.append(session.plated.number == before + 2)
-
-    when_done(work)
-    assert stood == [True, True, True]
 
 
 def test_the_size_is_known_at_once_while_places_for_copies_of_cut_models_are_still_looked_for() -> None:

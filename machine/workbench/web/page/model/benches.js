@@ -59,15 +59,16 @@ export function platePanel() {
     $("add-file").value = "";
   } });
   onState(({ addable }) => sayIn("add-opened", addable && `Add ${addable} to the plate instead`));
-  onNew(({ model, standing, copies, beside, problem }) => [model ? [{ name: model.name, copies, size_mm: (standing || model).size_mm }, ...beside] : [], problem], ([models, problem]) => putRows(
-    models.map(({ name, copies, size_mm: size }, number) => ({ id: `${number} ${name}`, content: `${copies} ${size} ${problem}`, make: () => plateRow(name, copies, size, number) })), $("plate-list")));
+  onNew(({ model, copies, parts, beside, number, problem }) => [model ? beside.toSpliced(number, 0, { name: model.name, copies, parts }) : [], number, problem], ([models, here, problem]) => putRows(
+    models.map((model, k) => ({ id: `${k} ${model.name}`, content: JSON.stringify([model, k, here, problem]), make: () => plateRow(model, k === here ? 0 : k + (k < here)) })), $("plate-list")));
 }
 
-function plateRow(name, copies, size, number) {
+/** number: of a model beside the one in work; 0: of that. */
+function plateRow({ name, copies, parts }, number) {
   const change = (count) => send(number ? { do: "beside", number, count } : { do: "copies", count });
   const onchange = ({ target }) => change(Math.max(1, Math.round(Number(target.value))));
   const field = made("input", { type: "number", min: 1, value: copies, ariaLabel: `Copies of ${name}`, onchange });
-  return made("li", {}, made("span", { text: name }, made("small", { text: `${size.map((x) => x.toFixed(1)).join(" × ")} mm` })), made("label", {}, "copies ", field), number ? removeButton(`Take ${name} off the plate`, () => change(0)) : "");
+  return made("li", {}, number ? button(name, () => send({ do: "work_on", number }), { title: `Turn, cut and mark ${name}` }) : made("b", { text: name }), made("small", { text: parts ? partsInWords(parts) : "not cut" }), made("label", {}, "copies ", field), number ? removeButton(`Take ${name} off the plate`, () => change(0)) : "");
 }
 
 function benchRow({ number, name, parts, work }) {

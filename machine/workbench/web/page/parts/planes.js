@@ -232,7 +232,7 @@ function newPlane(picture) {
 }
 
 function tellAll() {
-  const { state: { locked, search, cuts, unsliceable, misplaced, is_sure: sure }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store), invalid = invalidNow();
+  const { state: { locked, search, cuts, unsliceable }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store), invalid = invalidNow();
   disable({ "find-others": Boolean(search) || !locked.some(Boolean) });
   hide({ plane: !plane, "put-near": !nearest(), "plane-tools": !plane || tab !== "parts" || Boolean(search) });
   if (plane) {
@@ -248,7 +248,7 @@ function tellAll() {
   $("plane-told").className = why ? "refused" : invalid && "invalid";
   const told = why ? why : invalid && !store.hand ? `Cannot be cut off here: ${invalid}.` : !figures || !cuts.length ? ""
     : `${mm2(figures.support_area_mm2)} to support, ${figures.seam_mm.toFixed(0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
-  tell({ "plane-told": told, "plane-name": `Part ${part}`, unsliceable: unsliceable ? `Cannot be sliced: ${unsliceable}.` : misplaced && !sure ? "As they lie now, the models do not fit on the plate, as told under Model and Copies. To slice, the others are laid down and cut first, which may make room." : "" });
+  tell({ "plane-told": told, "plane-name": `Part ${part}`, unsliceable: unsliceable ? `Cannot be sliced: ${unsliceable}.` : "" });
 }
 
 const PLACE_SHARE = 0.02; // share of the model's diagonal: size of a marker

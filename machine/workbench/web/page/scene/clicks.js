@@ -1,14 +1,16 @@
 // Clicks: the use of the next click on the model; the axes in the corner of the picture, which turn the view; and the section view.
 
 import { $, listen, notice, numberIn, onKeys, pressed, toggle } from "../../../../view/template/elements.js";
-import { cross, dot } from "../../../../view/template/picture/math.js";
+import { add, cross, dot } from "../../../../view/template/picture/math.js";
 import { sectionAsked } from "../../../../view/template/picture/shapes.js";
+import { send } from "../line.js";
 import { layFacet } from "../model/model.js";
 import { markAt, markWord } from "../parts/marks-panel.js";
 import { openMenu } from "../parts/parts-panel.js";
 import { apartNow, pieceMet, shiftsOf } from "../parts/pieces.js";
 import { choosePart, cutLimb, partAt, planesNow, snapTo } from "../parts/planes.js";
 import { store, subscribe, update } from "../store.js";
+import { boxMet } from "./face-tree.js";
 import { brushOf, measureOf } from "./tools.js";
 import { met } from "./triangles.js";
 
@@ -79,9 +81,20 @@ export function handsOf(camera, picture) {
   return { changed: picture.ask, pressed: clicked, asked, take: brush.take };
 }
 
-/** The active tool uses a click on the model; without a tool it selects a part, or none beside the model. */
+/** The number of the other model whose box is under an event, counted from 1; 0: none, or the model in work is there. */
+function otherMet(event, picture) {
+  const { other_boxes: boxes, copies_mm: copies } = store.state, [from, along] = picture.sight(event), start = copies && add(from, [...copies[0], 0]);
+  const best = boxes.reduce((nearest, [number, [low, high]]) => {
+    const far = boxMet(low, high, start, along);
+    return far < nearest.far ? { number: number + 1, far } : nearest;
+  }, { number: 0, far: Infinity });
+  return best.number && !met(event, picture) ? best.number : 0;
+}
+
+/** The active tool uses a click on the model; without a tool it selects a part, or another model to work on, or nothing beside them. */
 function press(event, picture) {
-  const { clicks, tab } = store;
+  const { clicks, tab } = store, other = clicks || apartNow() ? 0 : otherMet(event, picture);
+  if (other) return void send({ do: "work_on", number: other });
   if (!clicks || apartNow()) return void (tab === "parts" && choosePart(partMet(event, picture)));
   if (clicks === "lay") return layFacet(picture, event);
   const [, , act] = WANTED[clicks], spot = act && met(event, picture);

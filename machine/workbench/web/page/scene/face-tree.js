@@ -52,12 +52,19 @@ function farTo([a, b, c], from, along) {
   return Math.abs(turn) >= 1e-12 && u >= -EDGE_SLACK && v >= -EDGE_SLACK && u + v <= 1 + EDGE_SLACK && far > 0 ? far : Infinity;
 }
 
+/** Distance along a ray at which it enters the box between two corners; Infinity: it does not. */
+export function boxMet(low, high, from, along) {
+  const ends = AXES.map((axis) => [low, high].map((end) => (end[axis] - from[axis]) / (along[axis] || 1e-300)));
+  const near = Math.max(0, ...ends.map((pair) => Math.min(...pair)));
+  return near <= Math.min(...ends.map((pair) => Math.max(...pair))) + EDGE_SLACK ? near : Infinity;
+}
+
 /** {face: the first of {corners, count} that a ray meets, -1: none, far: the distance in units of `along`}, in the frame of the triangles. */
 export function faceMet(shape, from, along) {
   const met = { face: -1, far: Infinity };
   const pierced = (low, high) => {
-    const ends = AXES.map((axis) => [low, high].map((end) => (end[axis] - from[axis]) / (along[axis] || 1e-300)));
-    return Math.max(0, ...ends.map((pair) => Math.min(...pair))) <= Math.min(met.far, ...ends.map((pair) => Math.max(...pair))) + EDGE_SLACK;
+    const near = boxMet(low, high, from, along);
+    return near < Infinity && near <= met.far + EDGE_SLACK;
   };
   visit(treeOf(shape), pierced, (face) => {
     const far = farTo(cornersAt(shape.corners, face), from, along);
