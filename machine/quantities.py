@@ -32,9 +32,11 @@ def newtons(force_n: float) -> str:
     return f"{float(f'{force_n:.2g}'):.12g}"
 
 
-def amount(value: float) -> str:
-    """Format with two decimals, or with fewer if three digits need fewer: 9.45, 20.7, 125."""
-    return f"{value:.{2 if value < 9.995 else 1 if value < 99.95 else 0}f}"
+def amount(value: float, decimals: int = 2) -> str:
+    """Format with at most three significant digits and at most this many decimals: 9.45, 20.7, 125, 1230; a negative value, which
+    rounding leaves of 0, as 0."""
+    rounded = float(f"{max(value, 0.0):.3g}")
+    return f"{rounded:.{min(decimals, 2 if rounded < 10.0 else 1 if rounded < 100.0 else 0)}f}"
 
 
 def percent(share: float | None, digits: int = 0) -> str:

@@ -10,6 +10,7 @@ from machine.gcode.commands import BED, COMMANDS, NOZZLE
 from machine.gcode.line_text import to_ascii
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram, fan_shares, pieces, temperatures
 from machine.gcode.words import quote
+from machine.quantities import amount
 from mdp.mesh import Floats
 from profiles.errors import counted
 from profiles.machine import Machine
@@ -202,7 +203,7 @@ def _profile(program: ParsedProgram, profile: Profile) -> Iterator[Finding]:
     for line, part, area in program.unsupported:
         where = f", most of them in layer {area.layer}" if area.layer else ""
         why = f": {area.reason}" if area.reason else ""
-        message = f"{area.mm2:g} mm² of risky faces of part {part} could be given no support{where}{why}"
+        message = f"{amount(area.mm2, 1)} mm² of risky faces of part {part} could be given no support{where}{why}"
         yield Finding("warning", "unsupported", line, part, area.layer, message)
 
 

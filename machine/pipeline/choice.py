@@ -6,7 +6,7 @@ import numpy as np
 
 from machine.pipeline.requests import ModelRequest
 from machine.planning.fit import check_parts
-from machine.quantities import minutes
+from machine.quantities import amount, minutes
 from mdp.cost.footing import BuildPlate
 from mdp.decomposition import FrontRow, Part
 from mdp.directions.orientation import in_words, side_in_words
@@ -69,7 +69,7 @@ def orientation_in_words(oriented: Oriented, otherwise: str) -> tuple[str, ...]:
     side, turns = side_in_words(orientation), in_words(orientation, held=True)
     where, better = f"{side} ({turns})" if side else turns, ""
     if laid is not None:
-        was = f"{oriented.upright.risky_mm2:.0f} mm² would need support" if standing is None else _with_marks(standing)
+        was = f"{amount(oriented.upright.risky_mm2, 0)} mm² would need support" if standing is None else _with_marks(standing)
         upright = was if oriented.upright_held else "it would hardly hold on the plate"
         better = f": {_with_marks(laid)}, standing as in its file {upright}"
     return (f"oriented {where}{better}; {otherwise}", *warning)
@@ -82,7 +82,7 @@ def standing_in_words(mesh: Mesh, profile: Profile) -> tuple[str, ...]:
 
 def _with_marks(row: FrontRow) -> str:
     taking = "" if row.time_s is None else f" in {minutes(row.time_s)}"
-    return f"{in_parts(row.parts)} with {row.cost_mm2:.0f} mm² of visible marks{taking}"
+    return f"{in_parts(row.parts)} with {amount(row.cost_mm2, 0)} mm² of visible marks{taking}"
 
 
 def in_parts(count: int) -> str:

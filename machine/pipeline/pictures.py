@@ -20,7 +20,7 @@ from PIL import ImageDraw, ImageFont
 from machine.gcode.lines import Lines
 from machine.pipeline.output import write_bytes
 from machine.pipeline.raster import Image, draw, seen_from
-from machine.quantities import minutes
+from machine.quantities import amount, minutes
 from machine.view.parts import part_colours, residual_faces
 from mdp.cost.cost import needing_upright
 from mdp.cut import cut, mesh_of, solid_of
@@ -228,7 +228,7 @@ def _frame(row: FrontRow, model: Mesh, profile: Profile, view: Floats, pixels: i
     frame = draw([floor_of(model), *parts], colours, reds=[None, *reds], axes=view, size=(pixels, pixels), span_mm=span)
     left, height = pixels / 32, pixels / 24
     frame = write_text(frame, "one piece" if row.parts == 1 else f"{row.parts} parts", (left, pixels / 12), pixels / 16, 90)
-    figures = f"{max(row.support_area_mm2, 0.0):.0f} mm² on support, {row.seam_mm:.0f} mm of seams"
+    figures = f"{amount(row.support_area_mm2, 0)} mm² on support, {amount(row.seam_mm, 0)} mm of seams"
     frame = write_text(frame, figures, (left, 0.93 * pixels), height, 110)
     if row.time_s is not None and row.filament_mm is not None:
         takes = f"{minutes(row.time_s)}, {row.filament_mm / 1000:.1f} m"

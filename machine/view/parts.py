@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from machine.quantities import about
+from machine.quantities import about, amount
 from mdp.decomposition import ORDER_TOLERANCE_MM, Decomposition, FrontRow, Part
 from mdp.mesh import Floats
 from mdp.overhang import risky_above, risky_upright
@@ -61,11 +61,11 @@ def front_record(row: FrontRow) -> dict[str, Any]:
 def front_figures(row: FrontRow) -> list[tuple[str, str, str]]:
     """Names, values and units of the costs of a row of a front; "" for an unknown value."""
     return [
-        ("area to support", f"{max(row.support_area_mm2, 0.0):.1f}", "mm²"),
-        ("seams", f"{row.seam_mm:.0f}", "mm"),
-        ("stair-stepping", f"{max(row.stairs_mm2, 0.0):.1f}", "mm²"),
+        ("area to support", amount(row.support_area_mm2, 1), "mm²"),
+        ("seams", amount(row.seam_mm, 0), "mm"),
+        ("stair-stepping", amount(row.stairs_mm2, 1), "mm²"),
         ("takes about", "" if row.time_s is None else about(row.time_s), ""),
-        ("plastic", "" if row.filament_mm is None else f"{row.filament_mm / 1000.0:.1f}", "m"),
+        ("plastic", "" if row.filament_mm is None else amount(row.filament_mm / 1000.0, 1), "m"),
     ]
 
 

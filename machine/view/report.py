@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from machine.dryrun.dryrun import DryRun, summary
 from machine.gcode.reader.parsed import MoveKind
 from machine.program import Alternative, Program
-from machine.quantities import duration, filament_g, newtons, percent, price_in_words
+from machine.quantities import amount, duration, filament_g, newtons, percent, price_in_words
 from machine.view.parts import risky_before_mm2
 from machine.view.paths import PRIME, WIPE, Layers, page_kinds
 from mdp.cost.cost import needing_upright
@@ -118,7 +118,7 @@ def _solid(part: Part, profile: Profile) -> Row:
     """A part's pose, volume, and areas that would need and will need support."""
     before = risky_before_mm2(part, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
     angles = [f"{part.pose.tilt_deg:.1f}°", f"{part.pose.turn_deg:.1f}°"]
-    areas = [f"{max(area, 0.0):.1f}" for area in (before, part.risky_area_mm2)]
+    areas = [amount(area, 1) for area in (before, part.risky_area_mm2)]
     return [str(part.index), *angles, f"{part.volume_mm3 / 1000.0:.2f}", *areas]
 
 
@@ -143,9 +143,9 @@ def _joints(joints: Sequence[Joint]) -> list[Table]:
     weakest, rows = weakest_of(joints), []
     for joint in joints:
         laid = _laid(joint.contact_share, joint.plastic_over_room) if sliced else []
-        lengths = [f"{joint.seam_mm:.0f}", f"{joint.arm_mm:.1f}"]
+        lengths = [amount(joint.seam_mm, 0), amount(joint.arm_mm, 1)]
         forces = [newtons(joint.load_n), newtons(joint.tension_n)]
-        rows.append([str(joint.part), f"{joint.area_mm2:.1f}", *laid, *lengths, *forces])
+        rows.append([str(joint.part), amount(joint.area_mm2, 1), *laid, *lengths, *forces])
     head = ["part", "mm²", *(LAID if sliced else []), "seam mm", "arm mm", "breaks at N", "pulled off at N"]
     notes = [*([CONTACT] if sliced else []), BREAKS]
     notes += [] if weakest is None else [f"the weakest: the joint of part {weakest.part}"]
@@ -154,7 +154,7 @@ def _joints(joints: Sequence[Joint]) -> list[Table]:
 
 def _interfaces(run: DryRun) -> list[Table]:
     """Table of the joints of a program without a model, from its G-code alone."""
-    rows = [[str(face.part), f"{face.area_mm2:.1f}", *_laid(face.contact, face.over_room)] for face in run.interfaces]
+    rows = [[str(face.part), amount(face.area_mm2, 1), *_laid(face.contact, face.over_room)] for face in run.interfaces]
     return [_table("Joints", ["part", "mm²", *LAID], rows, [CONTACT])] if rows else []
 
 
@@ -171,8 +171,8 @@ def _front(decomposition: Decomposition) -> list[Table]:
     for row in front:
         time = "–" if row.time_s is None else duration(row.time_s)
         filament = "–" if row.filament_mm is None else f"{row.filament_mm / 1000:.1f}"
-        areas = [f"{max(row.support_area_mm2, 0.0):.1f}", f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}", f"{row.cost_mm2:.1f}"]
-        total = ["–" if row.total_mm2 is None else f"{row.total_mm2:.1f}"] if summed else []
+        areas = [amount(row.support_area_mm2, 1), amount(row.seam_mm, 0), amount(row.stairs_mm2, 0), amount(row.cost_mm2, 1)]
+        total = ["–" if row.total_mm2 is None else amount(row.total_mm2, 1)] if summed else []
         rows.append([f"{row.parts}{' (chosen)' * row.chosen}", *areas, time, filament, *total])
     notes = [f"chosen {row.reason}" for row in front if row.chosen]
     notes += [f"{counted(row.parts, 'part')} only on request: {row.flaw}" for row in front if row.flaw and not row.chosen]
@@ -219,7 +219,7 @@ def _areas(decomposition: Decomposition, profile: Profile) -> Table:
         (f"in {len(decomposition.parts)} part{'s' * (len(decomposition.parts) != 1)}", decomposition.residual_area_mm2),
     ]
     whole = decomposition.risky_area_mm2
-    rows = [[name, f"{max(area, 0.0):.1f}", _share(whole - area, whole)] for name, area in risky_mm2]
+    rows = [[name, amount(area, 1), _share(whole - area, whole)] for name, area in risky_mm2]
     rows[0][2] = ""
     notes = [f"best single orientation: {in_words(best)}", "--compare also reports time and material"]
     return _table(COMPARED, ["print", "risky mm²", "less"], rows, notes)

@@ -23,8 +23,9 @@ def test_an_amount_has_at_most_three_digits() -> None:
         "10.0",
         "20.7",
         "100",
-        "1234",
+        "1230",
     ]
+    assert [amount(value, 1) for value in (-1e-9, 0.04, 86.94, 344.8, 1784.9)] == ["0.0", "0.0", "86.9", "345", "1780"]
 
 
 def test_without_a_price_nothing_is_told_of_it_not_even_in_the_file() -> None:

@@ -22,6 +22,7 @@ from machine.pipeline.pictures import contact_sheet, front_picture, parts_pictur
 from machine.pipeline.pipeline import build, decompose_model
 from machine.pipeline.project import with_meshes
 from machine.pipeline.requests import STDOUT, ModelRequest, Outputs
+from machine.quantities import amount
 from machine.view.page import parts_page
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.joint import joints_of
@@ -69,7 +70,7 @@ def _verdict(request: ModelRequest, decomposition: Decomposition) -> str:
     plan = request.outputs.plan or request.plan or (request.outputs.folder and request.outputs.folder / PLAN)
     command = shlex.join(["tiltprint", "export", request.model, *(["--plan", str(plan)] if plan else [])])
     return (
-        f"{in_parts(len(decomposition.parts))}, {decomposition.residual_area_mm2:.0f} mm² need support; "
+        f"{in_parts(len(decomposition.parts))}, {amount(decomposition.residual_area_mm2, 0)} mm² need support; "
         f"{command} makes the G-code"
     )
 
@@ -127,6 +128,6 @@ def _ways_table(ways: Sequence[tuple[str, FrontRow]]) -> str:
     for number, (name, row) in enumerate(ways):
         less = 1.0 - row.support_area_mm2 / first_mm2 if first_mm2 > 0.0 else 0.0
         share = f"{round(100 * less, 1) + 0.0:.1f} %" if number else ""
-        areas = [f"{max(row.support_area_mm2, 0.0):.1f}", share, f"{row.seam_mm:.0f}", f"{row.stairs_mm2:.0f}"]
-        rows.append([name, *areas, f"{row.cost_mm2:.1f}", *estimates(row)])
+        areas = [amount(row.support_area_mm2, 1), share, amount(row.seam_mm, 0), amount(row.stairs_mm2, 0)]
+        rows.append([name, *areas, amount(row.cost_mm2, 1), *estimates(row)])
     return table(rows)

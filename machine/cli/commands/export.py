@@ -21,6 +21,7 @@ from machine.pipeline.programs import load_program, refuse_errors
 from machine.pipeline.project import PICTURE_PX, STANDING, SUFFIX, Project, figures_of, project_bytes
 from machine.pipeline.requests import STDOUT, Given, ModelRequest
 from machine.planning.stops import check_stop_parts, parts_in_words
+from machine.quantities import amount
 from machine.view.page import print_page
 from mdp.model_file import DEMO
 from profiles.errors import OutputError, reason
@@ -142,10 +143,8 @@ def save(request: ModelRequest, out: Path) -> int:
     write_bytes(out, project_bytes(_project(request, each), plans, decomposition.mesh, picture))
     count = len(first.plan.parts) + 1
     command = shlex.join(["tiltprint", "export", str(out)])
-    contents = (
-        f"{request.name} {in_parts(count)}, {decomposition.residual_area_mm2:.0f} mm² need support, with its plan and profiles; "
-        f"{command} makes its G-code"
-    )
+    support = f"{amount(decomposition.residual_area_mm2, 0)} mm² need support"
+    contents = f"{request.name} {in_parts(count)}, {support}, with its plan and profiles; {command} makes its G-code"
     show(written_line((out,), contents))
     return 0
 

@@ -47,8 +47,8 @@ def parts_table(
     for part in decomposition.parts:
         angles = [f"{part.pose.tilt_deg:.1f}", f"{part.pose.turn_deg:.1f}", f"{part.base.offset_mm:.1f}"]
         share = f"{100 * part.volume_mm3 / decomposition.volume_mm3:.1f} %"
-        areas = [_number(part.risky_area_mm2), _number(risky_before_mm2(part, angle_deg, count_platform_faces))]
-        rows.append([str(part.index), *angles, f"{part.volume_mm3:.0f}", share, *areas])
+        areas = [amount(part.risky_area_mm2, 1), amount(risky_before_mm2(part, angle_deg, count_platform_faces), 1)]
+        rows.append([str(part.index), *angles, amount(part.volume_mm3, 0), share, *areas])
     front = "\n" + front_table(decomposition.front) if len(decomposition.front) > 1 else ""
     effort = f"{decomposition.candidates_evaluated} candidates in {decomposition.search_s:.1f} s\n" if verbose else ""
     return table(rows) + effort + front + "\n"
@@ -66,9 +66,9 @@ def joints_table(joints: "Sequence[Joint]") -> str:
     rows = [["joint of part", "area mm²", *laid, "seam mm", "arm mm", "breaks at N", "pulled off at N"]]
     for joint in joints:
         shares = [percent(joint.contact_share, 1), percent(joint.plastic_over_room)] if sliced else []
-        lengths = [f"{joint.seam_mm:.0f}", f"{joint.arm_mm:.1f}"]
+        lengths = [amount(joint.seam_mm, 0), amount(joint.arm_mm, 1)]
         forces = [newtons(joint.load_n), newtons(joint.tension_n)]
-        rows.append([str(joint.part), f"{joint.area_mm2:.1f}", *shares, *lengths, *forces])
+        rows.append([str(joint.part), amount(joint.area_mm2, 1), *shares, *lengths, *forces])
     sentence = f"weakest: part {weakest.part} breaks off at about {newtons(weakest.load_n)} N sideways at its tip"
     return table(rows) + sentence + "\n\n"
 
@@ -81,12 +81,12 @@ def front_table(front: "Sequence[FrontRow]") -> str:
     rows += [
         [
             str(row.parts),
-            _number(row.support_area_mm2),
-            f"{row.seam_mm:.0f}",
-            f"{row.stairs_mm2:.0f}",
-            _number(row.cost_mm2),
+            amount(row.support_area_mm2, 1),
+            amount(row.seam_mm, 0),
+            amount(row.stairs_mm2, 0),
+            amount(row.cost_mm2, 1),
             *estimates(row),
-            *(["-" if row.total_mm2 is None else _number(row.total_mm2)] if summed else []),
+            *(["-" if row.total_mm2 is None else amount(row.total_mm2, 1)] if summed else []),
         ]
         for row in front
     ]
@@ -99,12 +99,8 @@ def estimates(row: "FrontRow") -> list[str]:
     """Estimated time and metres of filament; dashes if unknown."""
     return [
         "-" if row.time_s is None else minutes(row.time_s),
-        "-" if row.filament_mm is None else f"{row.filament_mm / 1000.0:.1f}",
+        "-" if row.filament_mm is None else amount(row.filament_mm / 1000.0, 1),
     ]
-
-
-def _number(area_mm2: float) -> str:
-    return f"{max(area_mm2, 0.0):.1f}"
 
 
 def print_table(program: Program, profile: Profile) -> str:
@@ -126,7 +122,7 @@ def print_price(program: Program, profile: Profile) -> dict[str, float | str]:
 def _costs_line(program: Program, profile: Profile) -> str:
     filament_mm, material = _filament_mm(program), profile.material
     costs = price_in_words(filament_mm, material)
-    return f"costs {costs} for {filament_g(filament_mm, material):.1f} g of filament\n" if costs else ""
+    return f"costs {costs} for {amount(filament_g(filament_mm, material), 1)} g of filament\n" if costs else ""
 
 
 def _filament_mm(program: Program) -> float:
@@ -217,7 +213,7 @@ def _count(number: int, things: str) -> str:
 def compare_table(alternatives: tuple[Alternative, ...]) -> str:
     """Table of the alternatives."""
     rows = [["print", "time", "filament", "mass", "support", "interfaces", "needs support"]]
-    rows += [[way.name, *_costs(way), f"{way.risky_mm2:.1f} mm²"] for way in alternatives]
+    rows += [[way.name, *_costs(way), f"{amount(way.risky_mm2, 1)} mm²"] for way in alternatives]
     head, *lines = table(rows).splitlines()
     notes = [f"{way.name}: {note}" for way in alternatives for note in (way.orientation, way.message) if note]
     return "\n".join(["", head, *lines, *notes]) + "\n"
@@ -228,6 +224,6 @@ def _costs(alternative: Alternative) -> list[str]:
     if alternative.time_s is None:
         return ["-"] * 5
     filament_m, support_cm3 = (alternative.filament_mm or 0.0) / 1000, (alternative.support_mm3 or 0.0) / 1000
-    mass = f"{alternative.filament_g or 0.0:.1f} g"
+    mass = f"{amount(alternative.filament_g or 0.0, 1)} g"
     volumes = [f"{amount(support_cm3)} cm³", f"{amount(sum(alternative.interface_mm3.values()) / 1000)} cm³"]
     return [duration(alternative.time_s), f"{amount(filament_m)} m", mass, *volumes]

@@ -182,7 +182,7 @@ export function onKeys(keys, closed) {
   });
 }
 
-export const mm2 = (area) => `${Math.max(area, 0).toFixed(1)} mm²`;
+export const mm2 = (area) => `${area < 99.95 ? Math.max(area, 0).toFixed(1) : Number(area.toPrecision(3))} mm²`;
 export const clock = (seconds, form = {}) => new Date(1000 * seconds).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", ...form });
 
 /** A time of today, or a date and a time. */

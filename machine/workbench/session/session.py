@@ -219,12 +219,15 @@ class Session(SessionBase):
         await self.take_given(f"take the settings of {model.name}", lambda given: with_given(given, inside))
         self.settings_note = model.key, note
 
-    async def open_demo(self, *, name: str) -> None:
-        """Open a model that ships with the program. Raises UserError for an unknown one."""
+    async def open_demo(self, *, name: str, add: bool = False) -> None:
+        """Open a model that ships with the program; add: put it beside that on the bench. Raises UserError for an unknown one."""
         if not name.startswith("demo:"):
             raise PlanError(f"{name}: only the models that ship with the program are opened by name; choose or drop a file")
-        before = self.bench
-        await self.open_model(await self._copy_of(name, None), name)
+        before, file = self.bench, await self._copy_of(name, None)
+        if add and before.model is not None:
+            await self.add_model(file, name)
+            return
+        await self.open_model(file, name)
         if (plan := plan_beside(name)) is not None:
             opened = self.note
             await self.open_plan(plan)

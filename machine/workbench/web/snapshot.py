@@ -11,7 +11,7 @@ import numpy as np
 from machine.dryrun.findings import Finding
 from machine.planning.stops import Stop
 from machine.program import Alternative
-from machine.quantities import about, duration, filament_g, newtons, percent, price_in_words
+from machine.quantities import about, amount, duration, filament_g, newtons, percent, price_in_words
 from machine.view.parts import front_record, page_colours
 from machine.view.scene import machine_bodies
 from machine.workbench.bench.bench import Bench, History, Step
@@ -63,7 +63,7 @@ def verdict_of(findings: Sequence[Finding], profile: Profile, hanging_mm2: float
         return verdict | {"kind": "problem", "text": f"{count}: {first.message}", "finding": errors[0], "remedy": remedy}
     process = profile.process
     if process.support == "none" and not process.spiral_vase and hanging_mm2 > process.support_least_mm2:
-        return verdict | {"text": f"Ready to print, but {hanging_mm2:.0f} mm² would need support", "remedy": SUPPORT_ON}
+        return verdict | {"text": f"Ready to print, but {amount(hanging_mm2, 0)} mm² would need support", "remedy": SUPPORT_ON}
     warnings = f"; {len(findings)} warning{'s' * (len(findings) > 1)} below" if findings else ""
     return verdict | {"text": f"Ready to print{warnings}"}
 
@@ -90,11 +90,11 @@ def _figures(alternative: Alternative, material: Material) -> list[tuple[str, st
     mm, support_mm3 = alternative.filament_mm or 0.0, alternative.support_mm3 or 0.0
     figures = {
         "time": about(alternative.time_s or 0.0),
-        "plastic": f"{filament_g(mm, material):.1f} g",
+        "plastic": f"{amount(filament_g(mm, material), 1)} g",
         "costs": price_in_words(mm, material),
         "support": f"{support_mm3 / 1000.0:.2f} cm³",
         "support marks": _mm2(alternative.risky_mm2),
-        "seams between parts": f"{alternative.seam_mm:.0f} mm",
+        "seams between parts": f"{amount(alternative.seam_mm, 0)} mm",
         "stair-stepping": _mm2(alternative.stairs_mm2),
         "findings": f"{alternative.findings}",
     }
@@ -107,11 +107,11 @@ def _joint(joint: Joint) -> tuple[str, ...]:
         "–" if share is None else f"{percent(share, digits)} %"
         for share, digits in ((joint.contact_share, 1), (joint.plastic_over_room, 0))
     )
-    return f"{joint.part}", _mm2(joint.area_mm2), contact, plastic, f"{joint.seam_mm:.0f} mm", f"{newtons(joint.load_n)} N"
+    return f"{joint.part}", _mm2(joint.area_mm2), contact, plastic, f"{amount(joint.seam_mm, 0)} mm", f"{newtons(joint.load_n)} N"
 
 
 def _mm2(area: float) -> str:
-    return f"{max(area, 0.0):.1f} mm²"
+    return f"{amount(area, 1)} mm²"
 
 
 def _under_way(session: Session) -> dict[str, Any] | None:
@@ -134,7 +134,10 @@ def _sliced(session: Session) -> dict[str, Any] | None:
         "ready": sorted(slices.walls),
         "told": [
             ("print time", duration(sliced.time_s)),
-            ("filament", f"{sliced.filament_mm / 1000.0:.2f} m, {filament_g(sliced.filament_mm, profile.material):.1f} g"),
+            (
+                "filament",
+                f"{amount(sliced.filament_mm / 1000.0)} m, {amount(filament_g(sliced.filament_mm, profile.material), 1)} g",
+            ),
             *([("cost", costs)] if costs else []),
         ],
         "verdict": verdict_of(sliced.findings, profile, sliced.cost.risky_mm2, out_of_date=session.slicing.out_of_date),
@@ -397,7 +400,7 @@ def _part_figures(bench: Bench, trial: Trial) -> list[list[tuple[str, str]]]:
     others = [part for part in trial.parts if part is not None]
     volume_mm3 = 0.0 if bench.model is None else bench.model.volume_mm3 - sum(part.volume_mm3 for part in others)
     support_mm2 = (trial.support_area_mm2 or 0.0) - sum(part.support_mm2 for part in others)
-    cut = [[("seam", f"{part.rim_mm:.0f} mm"), ("cut edge", f"{part.edge_deg:.0f}°")] for part in others]
+    cut = [[("seam", f"{amount(part.rim_mm, 0)} mm"), ("cut edge", f"{part.edge_deg:.0f}°")] for part in others]
     whole = [(volume_mm3, support_mm2), *((part.volume_mm3, part.support_mm2) for part in others)]
     return [
         [("volume", f"{volume / 1000.0:.2f} cm³"), ("support", _mm2(support)), *own]

@@ -21,7 +21,7 @@ from machine.pipeline.pictures import PLAIN, contact_sheet, front_picture, parts
 from machine.pipeline.project import PICTURE_PX, STANDING, project_bytes, read_folder, with_meshes_beside
 from machine.planning.fit import check_parts
 from machine.planning.stops import check_stop_parts
-from machine.quantities import newtons
+from machine.quantities import amount, newtons
 from machine.view.encoding import pack
 from machine.view.parts import page_colours, part_colours
 from machine.view.scene import solids, surfaces
@@ -257,7 +257,9 @@ def _joint_words(record: dict[str, Any]) -> dict[str, str]:
     if (joint := record["joint"]) is None:
         return {}
     weakest = ": the weakest" if joint["weakest"] else ""
-    return {"holds": f"{joint['area_mm2']:.1f} mm², breaks at about {newtons(joint['load_n'])} N sideways at the tip{weakest}"}
+    return {
+        "holds": f"{amount(joint['area_mm2'], 1)} mm², breaks at about {newtons(joint['load_n'])} N sideways at the tip{weakest}"
+    }
 
 
 def out_of_reach(parts: Sequence[Part], profile: Profile) -> str:

@@ -1,6 +1,6 @@
 // Sliders: the one over the whole print, with playback and keys, and the two that limit the layers, with a bar for the time of every layer.
 
-import { $, duration, hide, listen, nextFrame, numberIn, onKeys, optionsOf, tell } from "../elements.js";
+import { $, button, duration, hide, listen, nextFrame, numberIn, onKeys, optionsOf, tell, toggle } from "../elements.js";
 import { viewKeys } from "../picture/camera.js";
 import { density } from "../picture/gl.js";
 import { clamp } from "../picture/math.js";
@@ -24,8 +24,7 @@ export function courseOf(print, scene, bells) {
     position.setAttribute("aria-valuetext", `${duration(scene.time())} of ${duration(total)}`);
     tell({ clock: `${duration(scene.time())} / ${duration(total)}` });
   });
-  paintStrip($("strip"), header.parts, rows.count);
-  return player;
+  return Object.assign(player, { toPart: stripOf($("strip"), print, scene, bells, player.go) });
 }
 
 function playerOf(scene, bells, total) {
@@ -59,13 +58,17 @@ function playerOf(scene, bells, total) {
   return player;
 }
 
-/** Each part's rows as a piece in its colour. */
-function paintStrip(strip, parts, count) {
-  const share = (row) => `${((100 * row) / Math.max(count, 1)).toFixed(3)}%`;
-  const pieces = parts.filter((part) => part.rows).flatMap(({ colour, first_row: first, rows }) => [
-    `transparent ${share(first)}`, `${colour} ${share(first)}`, `${colour} ${share(first + rows)}`, `transparent ${share(first + rows)}`,
-  ]);
-  if (pieces.length) strip.style.backgroundImage = `linear-gradient(to right, ${pieces.join(", ")})`;
+/** A button at the start of each part, as wide as its moves, in its colour while the beads are coloured by part. Returns a function that goes to the next or previous start: (1 or -1). */
+function stripOf(strip, { rows, header }, scene, bells, go) {
+  const parts = header.parts.filter((part) => part.rows && part.index), share = (row) => `${((100 * row) / Math.max(rows.count, 1)).toFixed(3)}%`;
+  strip.replaceChildren(...parts.map(({ index, first_row: first, rows: own }) => button(`${index}`, () => go(first), { title: `Start of part ${index}`, ariaLabel: `Start of part ${index}`, style: `left: ${share(first)}; width: ${share(own)}` })));
+  const paint = () => parts.forEach(({ colour }, k) => { strip.children[k].style.backgroundColor = scene.mode === "part" ? colour : ""; });
+  bells.on("colours", paint);
+  paint();
+  return (way) => {
+    const starts = parts.map((part) => part.first_row), next = way > 0 ? starts.find((row) => row > scene.row) : starts.findLast((row) => row < scene.row);
+    if (next !== undefined) go(next);
+  };
 }
 
 export function keysOf({ scene, camera, player, look, fit, chooseTheme }) {
@@ -74,13 +77,13 @@ export function keysOf({ scene, camera, player, look, fit, chooseTheme }) {
   const keys = {
     ...viewKeys(camera, look), " ": () => player.toggle(), ",": () => player.step(-1), ".": () => player.step(1),
     "[": layer(-1), "]": layer(1), "{": layer(-1), "}": layer(1),
-    PageUp: layer(1), PageDown: layer(-1), Home: () => scene.go(0), End: () => scene.go(Infinity),
+    PageUp: layer(1), PageDown: layer(-1), p: ({ shiftKey }) => player.toPart(shiftKey ? -1 : 1), Home: () => scene.go(0), End: () => scene.go(Infinity),
     t: press("show-travels"), s: press("show-seams"), m: press("show-machine"), b: press("show-beads"),
     r: () => { $("frame").value = scene.riding ? "machine" : "workpiece"; $("frame").dispatchEvent(new Event("change")); },
     f: fit, d: () => chooseTheme(!scene.dark), "?": () => $("help").showPopover(),
   };
   onKeys(keys, () => $("help").matches(":popover-open"));
-  listen("click", { "help-button": keys["?"] });
+  listen("click", { "help-button": keys["?"], "panel-shown": ({ target }) => { target.ariaExpanded = String(toggle("panel-shown", !document.body.classList.contains("panel-shown"))); } });
 }
 
 export function layerSliders({ header: { parts } }, scene, bells) {

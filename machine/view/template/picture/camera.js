@@ -65,7 +65,7 @@ export function cameraOf() {
 }
 
 export const CORNERS = [-55, 55, -125, 125];
-const VIEWS = { front: [-90, 0], side: [0, 0], top: [-90, 89.5] };
+const VIEWS = { front: [-90, 0], side: [0, 0], top: [-90, 89.5], bottom: [-90, -89.5] };
 
 /** The buttons that look from a side or a corner, and the first view, degrees. */
 export function viewButtons(camera, corner, changed) {
@@ -136,7 +136,7 @@ export function handle(canvas, camera, { changed, pressed, asked = () => {}, tak
 
 /** Controls that turn, shift and zoom the view, and look from a side. */
 export function viewKeys(camera, look) {
-  const turn = 6 * RAD, shift = 0.05, views = ["corner", "front", "side", "top"];
+  const turn = 6 * RAD, shift = 0.05, views = ["corner", "front", "side", "top", "bottom"];
   const arrow = (x, y) => (event) => {
     if (event.shiftKey) camera.pan(-x * shift, y * shift); else camera.orbit(-x * turn, y * turn);
     look();

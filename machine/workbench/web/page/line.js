@@ -102,6 +102,8 @@ export function newest({ read, take, insists = false, begin = () => {} }) {
   };
 }
 
+let savedTimer = 0;
+
 /** Let the browser save the file that the server creates at an address. */
 export async function save(address) {
   const answer = await fetch(address);
@@ -110,7 +112,8 @@ export async function save(address) {
   const link = made("a", { href: URL.createObjectURL(await answer.blob()), download: name });
   link.click();
   notice(`saved ${name}`, "saved");
-  setTimeout(notice, SAVED_MS, "", "saved");
+  clearTimeout(savedTimer);
+  savedTimer = setTimeout(notice, SAVED_MS, "", "saved");
   setTimeout(() => URL.revokeObjectURL(link.href), 60000);
 }
 

@@ -57,7 +57,8 @@ export function platePanel() {
   listen("change", { "add-file": async () => {
     for (const file of [...$("add-file").files]) await sendFile(file, { add: "yes" });
     $("add-file").value = "";
-  } });
+  }, "add-demo": ({ target }) => { send({ do: "demo", name: target.value, add: true }); target.value = ""; } });
+  $("add-demo").append(...[...$("demo").options].map(({ value, text }) => new Option(value ? text : "a demo …", value)));
   onState(({ addable }) => sayIn("add-opened", addable && `Add ${addable} to the plate instead`));
   onNew(({ model, copies, parts, beside, number, problem }) => [model ? beside.toSpliced(number, 0, { name: model.name, copies, parts }) : [], number, problem], ([models, here, problem]) => putRows(
     models.map((model, k) => ({ id: `${k} ${model.name}`, content: JSON.stringify([model, k, here, problem]), make: () => plateRow(model, k === here ? 0 : k + (k < here)) })), $("plate-list")));

@@ -109,7 +109,7 @@ export function marksPanel(picture) {
     });
   });
   const take = (faceMarks, key) => { update({ faceMarks }); document.documentElement.dataset.marks = key; };
-  const fetchMarks = newest({ read: async (answer) => new Uint8Array(await answer.arrayBuffer()), take });
+  const fetchMarks = newest({ read: async (answer) => new Uint8Array(await answer.arrayBuffer()), take, insists: true });
   onState((state, before) => {
     const changed = !alike(state.zones, before?.zones), gone = before && !state.busy && changed && store.zone && !state.zones.some((zone) => sameMark(zone, store.zone));
     if (changed || (state.problem && state.problem !== before?.problem)) update({ zoneHand: null, ...(gone ? { zone: null } : {}) });

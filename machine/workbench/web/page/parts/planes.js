@@ -215,7 +215,7 @@ export function planesPanel(picture) {
   byPlane("click", { remove: removePart, lock: (part) => lockPart(part, !isLocked()), neck: (part) => send({ do: "neck", part }), "all-above": () => cutLimb(null), earlier: (part) => reorderPart(part, part - 1), later: (part) => reorderPart(part, part + 1) });
   byPlane("change", { "plane-offset": () => putPlane({ ...planeNow(), offset_mm: numberIn("plane-offset") }), "plane-tilt": leanAsTyped, "plane-towards": leanAsTyped });
   onData("tilt", ({ tilt }) => { if (planeNow()) lean(Number(tilt), numberIn("plane-towards")); });
-  listen("click", { "find-others": () => send({ do: "search", ranker: $("ranker").value }), add: () => near(newPlane(picture)), "put-near": () => near(nearest()) });
+  listen("click", { "find-others": () => send({ do: "search", ranker: $("ranker").value }), add: () => near(newPlane(picture)), "put-near": () => near(nearest()), "show-invalid": () => { $("tab-parts").click(); choosePart(2 + store.state.invalid.findIndex(Boolean)); } });
   onState((state, before) => {
     const { hand, part } = store, { trial, cuts, model } = state;
     if (part > Math.max(state.parts, 1) || !model) update({ part: 0 });
@@ -232,9 +232,9 @@ function newPlane(picture) {
 }
 
 function tellAll() {
-  const { state: { locked, search, cuts, unsliceable }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store), invalid = invalidNow();
+  const { state: { locked, search, cuts, unsliceable, invalid: all }, part, tab } = store, plane = planeNow(), figures = figuresNow(), why = refusalNow(store), invalid = invalidNow();
   disable({ "find-others": Boolean(search) || !locked.some(Boolean) });
-  hide({ plane: !plane, "put-near": !nearest(), "plane-tools": !plane || tab !== "parts" || Boolean(search) });
+  hide({ plane: !plane, "put-near": !nearest(), "plane-tools": !plane || tab !== "parts" || Boolean(search), "show-invalid": Boolean(invalid) || !all.some(Boolean) });
   if (plane) {
     const [tilt, towards] = anglesOf(plane.normal);
     Object.entries({ offset: plane.offset_mm.toFixed(2), tilt: tilt.toFixed(1), towards: towards.toFixed(1) }).forEach(([name, value]) => fill($(`plane-${name}`), value));

@@ -112,10 +112,7 @@ export function axesOf(camera, picture) {
   const group = $("axes");
   const ends = Object.fromEntries([...group.querySelectorAll("[data-end]")].map((end) => [end.dataset.end, end]));
   let seen = "";
-  const look = (name) => {
-    camera.lookFrom(...ENDS[name][1]);
-    picture.ask();
-  };
+  const look = (name) => { camera.lookFrom(...ENDS[name][1]); picture.ask(); };
   for (const [name, end] of Object.entries(ends)) {
     end.addEventListener("click", () => look(name));
     end.addEventListener("keydown", (event) => { if (["Enter", " "].includes(event.key)) { event.preventDefault(); event.stopPropagation(); look(name); } });

@@ -193,16 +193,10 @@ export function pictureOf(canvas, camera) {
       return w > 0 ? [(x + 1) / 2 * canvas.clientWidth, (1 - y) / 2 * canvas.clientHeight] : null;
     },
     /** The plane above which everything is cut off, in the build plate's frame, or none. */
-    section: (plane) => {
-      if (!alike(plane, scene.section)) ask();
-      scene.section = plane;
-    },
+    section: (plane) => { if (!alike(plane, scene.section)) ask(); scene.section = plane; },
     cutAway: (place) => Boolean(scene.section) && dot(scene.section.normal, place) > scene.section.offset_mm + ON_SECTION_MM,
     /** Centre the view on a point of that frame. */
-    look: (place) => {
-      camera.target = add(place, scene.place);
-      ask();
-    },
+    look: (place) => { camera.target = add(place, scene.place); ask(); },
     eye: () => sub(camera.eye(), scene.place),
     /** Size of a pixel in mm at a point. */
     pixelAt: (place) => (2 * HALF_HEIGHT * length(sub(camera.eye(), add(place, scene.place)))) / canvas.clientHeight,
@@ -218,10 +212,7 @@ export function pictureOf(canvas, camera) {
       anew("model", true);
     },
     /** Fit the view to everything drawn and to further points. */
-    fit: (others = []) => {
-      camera.fit([...placesDrawn(scene), ...others].map((place) => add(place, scene.place)), sizeOf(canvas));
-      ask();
-    },
+    fit: (others = []) => { camera.fit([...placesDrawn(scene), ...others].map((place) => add(place, scene.place)), sizeOf(canvas)); ask(); },
     /** The ray of an event on the canvas in the build plate's frame, with the model in its middle; it begins at the section if there is one. */
     sight(event) {
       const [eye, along] = camera.sight(placeOn(canvas, event)), from = sub(eye, scene.place), { normal, offset_mm: offset } = scene.section || {};
