@@ -141,11 +141,11 @@ def _refuse_far_places(program: ParsedProgram) -> None:
 
 
 class Timeline:
-    """Axis positions after any line of a program, the remaining time, and the number of layers of each part."""
+    """Axis positions and filament after any line of a program, the remaining time, and the number of layers of each part."""
 
     def __init__(self, run: DryRun) -> None:
         program, self._letters, self._waits = run.program, run.letters, run.waits
-        self._line, self._ends = program.line, program.end
+        self._line, self._ends, self._filament_mm = program.line, program.end, program.filament_mm
         self._done_s = np.concatenate([[0.0], np.cumsum(run.times_s)])
         laying = program.kind == MoveKind.EXTRUDE  # the travel to a part still belongs to the layer before it
         self._layers = {part: len(np.unique(program.layer[laying & (program.part == part)])) for part in program.parts}
@@ -154,6 +154,10 @@ class Timeline:
         """Axis positions after a line of the program, by letter, mm and deg; {} before the first move."""
         row = self._rows(file_line) - 1
         return {} if row < 0 else dict(zip(self._letters, self._ends[row].tolist(), strict=False))
+
+    def filament_mm(self, file_line: int) -> float:
+        """Filament pushed up to a line of the program, mm."""
+        return float(np.max(self._filament_mm[: self._rows(file_line)], initial=0.0))
 
     def remaining_s(self, file_line: int) -> float:
         """Seconds of moves and waits after a line of the program, without heating before the print and homing."""

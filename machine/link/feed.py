@@ -80,10 +80,11 @@ class Feed:
         self._shifts_z = resume_point is None or resume_point.shifts_z
         if not (self._shifts_z and exchange.connection.greeting.capabilities.get("BABYSTEPPING", True)):
             self.pending.babystep = ""
-        if resume_point is not None and resume_point.z_offset_mm and not self.pending.babystep:
-            offset = f"{resume_point.z_offset_mm:+g} mm"
-            raise PrinterError(f"the print had a Z offset of {offset}, which this firmware cannot set: nothing was moved")
-        self.started, self.history = True, self._new_history()
+        if resume_point is not None:
+            resume_point.check_offset(self.pending.babystep)
+            self.pending.z_offset_mm = round(self.pending.z_offset_mm + resume_point.z_offset_mm, 3)  # the user may have shifted
+            self.pending.sent_offset_mm = resume_point.z_offset_mm
+        self.started, self.history = True, self._new_history(0 if resume_point is None else resume_point.line - 1)
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send(f"M155 S{REPORT_S}")
         for line, command in self._commands(lines):
@@ -102,7 +103,6 @@ class Feed:
 
     def _approach(self, resume_point: ResumePoint) -> None:
         """Send the commands before the first line of a resumed print, and check them by the printer's position."""
-        self.pending.z_offset_mm = self.pending.sent_offset_mm = resume_point.z_offset_mm
         self.set_state(PrintState.RESUMING)
         self.history = self._new_history(resume_point.line - 1)
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
@@ -283,7 +283,7 @@ class Feed:
         self.history.acknowledge(self.exchange.connection.window.acknowledged)
         self.poll()
         self.reports.check_silence(now_s, self._cannot_report())
-        if self._journal is not None:
+        if self._journal is not None and self.started:  # until then it holds the record of an interrupted print
             self._journal.update(self._checkpoint(), now_s)
         asked_s = max(self.reports.temperature_s, self._asked_s)
         if now_s - asked_s >= ASK_S and self.exchange.connection.send("M105", now_s):

@@ -35,7 +35,7 @@ from machine.link.status import SEVERAL, PrinterStatus
 from machine.planning.stand import Turn
 from mdp.mesh import Floats
 from mdp.pose import Pose
-from profiles.errors import FirmwareError, JournalError, SilenceError
+from profiles.errors import FirmwareError, JournalError, PrinterError, SilenceError
 from profiles.machine import Machine
 from profiles.messages import key_name, option, phrase
 from profiles.profile import Profile
@@ -74,6 +74,12 @@ class ResumePoint:
     homes: bool = False  # X and Y
     z_offset_mm: float = 0.0  # that the firmware has after these commands
     shifts_z: bool = True  # whether the firmware can change it
+
+    def check_offset(self, babystep: str) -> None:
+        """Raise PrinterError if the firmware cannot set the Z offset. babystep: its command for that, "": it has none."""
+        if self.z_offset_mm and not babystep:
+            offset = f"{self.z_offset_mm:+g} mm"
+            raise PrinterError(f"the print had a Z offset of {offset}, which this firmware cannot set: nothing was moved")
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pathlib import Path
 from time import monotonic, sleep, time
 from typing import Any, BinaryIO
 
-from machine.dryrun.dryrun import summary
+from machine.dryrun.dryrun import Timeline
 from machine.link.journal import is_being_printed
 from machine.link.print_state import PrintState
 from machine.pipeline.programs import LoadedProgram
@@ -23,21 +23,29 @@ from profiles.folders import state_folder
 FOLDER = "prints"
 MOST_PRINTS = 100  # files that are kept, the newest ones
 LOCKED_WITHIN_S = 1.0
+Reach = Callable[[int, int], None]  # told the first and the last line of the program that have been printed so far
 NOT_PRINTED = (PrintState.DECLINED, PrintState.REFUSED)
 
 
-def recorded(loaded: LoadedProgram, port: str, act: Callable[[], End]) -> End:
-    """Print a program, as `act` does, and keep how that ended. Raises what `act` raises; a print does not fail because its record
-    cannot be written."""
-    end, file = End(PrintState.FAILED), None
+def recorded(loaded: LoadedProgram, port: str, act: Callable[[Reach], End]) -> End:
+    """Print a program, as `act` does, and keep how that ended, with the filament that it took. Raises what `act` raises; a print
+    does not fail because its record cannot be written."""
+    end, file, lines = End(PrintState.FAILED), None, (1, 0)
+
+    def reach(first: int, last: int) -> None:
+        nonlocal lines
+        lines = first, last
+
     with suppress(OSError, OutputError):
         file = _new_file()
         _write(file, {"name": loaded.name, "port": port, "begun": time()})
     try:
-        end = act()
+        end = act(reach)
         return end
     finally:
-        filament_m = summary(loaded.program.run)["filament_mm"] / 1000.0 if end.state is PrintState.DONE else None
+        first, last = lines if end.state is not PrintState.DONE else (lines[0], len(loaded.program.lines))
+        filament_mm = Timeline(loaded.program.run).filament_mm
+        filament_m = None if end.state is PrintState.LEFT else (filament_mm(last) - filament_mm(first - 1)) / 1000.0
         if file is not None:
             with suppress(OSError), file:
                 _write(file, {"outcome": end.state.value, "ended": time(), "filament_m": filament_m})
@@ -48,7 +56,7 @@ def recorded(loaded: LoadedProgram, port: str, act: Callable[[], End]) -> End:
 
 def past_prints() -> list[dict[str, Any]]:
     """Prints that are over, the newest first: `name`, `port`, `outcome` (a value of PrintState), `begun` (seconds since 1970),
-    `seconds` (None where the print was killed) and `filament_m` (None where it did not come to its end)."""
+    `seconds` and `filament_m` (None where the print was killed or left)."""
     with suppress(OSError, OutputError):
         return [past for file in sorted(_files(), reverse=True) if (past := _past(file)) is not None]
     return []

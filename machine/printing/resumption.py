@@ -39,7 +39,7 @@ from machine.pipeline.output import check_roles, printing_files
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import check_dialect
 from machine.printing.destination import SerialPort, Simulated, at_printer
-from machine.printing.history import recorded
+from machine.printing.history import Reach, recorded
 from machine.printing.job import NOT_MOVED, End, Person, PrintJob, Scene
 from machine.printing.journal_folder import continue_journal
 from machine.printing.serial_log import new_log
@@ -128,10 +128,10 @@ def print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: 
     If several heights of the tip are possible, the user chooses it. Raises PrinterError, and JournalError when no user can
     answer.
     """
-    return recorded(rest, cut_off.at.name, lambda: _print_rest(cut_off, rest, job, person))
+    return recorded(rest, cut_off.at.name, lambda reach: _print_rest(cut_off, rest, job, person, reach))
 
 
-def _print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: Person) -> End:
+def _print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person: Person, reach: Reach) -> End:
     with _further_journal(cut_off, job) as further:
 
         def begin(status: PrinterStatus) -> ResumePoint:
@@ -145,6 +145,7 @@ def _print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person:
                     raise CancelledError
                 point = replace(point, stood_mm=heights[chosen])
                 way = plan_resume(point, status, cut_off.profile)
+            way.check_offset(dialect_of(cut_off.profile.machine).babystep if way.shifts_z else "")
             if person.ask(_question(way, point, cut_off.profile)) is None:
                 raise CancelledError
             _hand_over(cut_off, further, way.line - 1)
@@ -152,7 +153,7 @@ def _print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person:
 
         title = f"the rest of {rest.name} to {cut_off.at.name}"
         with new_log("print", title, job.log) as log:
-            outcome = stream_program(rest, cut_off.at, Scene(title, log, further), person, begin=begin)
+            outcome = stream_program(rest, cut_off.at, Scene(title, log, further), person, reach, begin=begin)
         if outcome.cancelled and outcome.heaters_off is None:
             say(NOT_MOVED.sentence)
             return NOT_MOVED

@@ -17,7 +17,7 @@ from machine.link.stream import Outcome, print_lines
 from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.destination import AtPrinter, SerialPort, Simulated
-from machine.printing.history import recorded
+from machine.printing.history import Reach, recorded
 from machine.printing.job import DONE, End, Person, PrintJob, Scene
 from machine.printing.journal_folder import new_journal
 from machine.printing.ports import describe_answer, identify_printer
@@ -54,16 +54,16 @@ class SerialPrinter:
 
     def print(self, loaded: LoadedProgram) -> End:
         """Stream the program, with a log and a journal, and report how it ended."""
-        return recorded(loaded, self._at.name, lambda: self._print(loaded))
+        return recorded(loaded, self._at.name, lambda reach: self._print(loaded, reach))
 
-    def _print(self, loaded: LoadedProgram) -> End:
+    def _print(self, loaded: LoadedProgram, reach: Reach) -> End:
         simulated = isinstance(self._at, Simulated)
         journalled = self._journal(loaded) if not simulated or self._job.journal is not None else nullcontext()
         title = f"{loaded.name} to {'the simulated printer' if simulated else self._at.name}"
         with new_log("print", title, self._job.log) as log, _pointing_to(log), journalled as journal:
             if isinstance(self._at, Simulated):
-                return _print_simulated(loaded, self._at, Scene(title, log, journal), self.person)
-            outcome = stream_program(loaded, self._at, Scene(title, log, journal), self.person)
+                return _print_simulated(loaded, self._at, Scene(title, log, journal), self.person, reach)
+            outcome = stream_program(loaded, self._at, Scene(title, log, journal), self.person, reach)
             return report_end(outcome, log, journal)
 
     def _journal(self, loaded: LoadedProgram) -> AbstractContextManager[Journal | None]:
@@ -87,14 +87,14 @@ class SerialPrinter:
         return f"{described}, answers at {self._at.name} and is one for {machine.name}"
 
 
-def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person: Person) -> End:
+def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person: Person, reach: Reach) -> End:
     """Stream to the simulated printer and report what it has done."""
     machine = loaded.profile.machine
     usb = loaded.profile.model_copy(update={"machine": machine.model_copy(update={"receive_bytes": USB_BYTES})})
     speed = at.speed or inf
     with SimulatedPrinter(machine, speed, build=BuildOptions(queue=QUEUE)) as printer:
         pace, port = speed if isfinite(speed) else None, SerialPort(printer.path)
-        outcome = stream_program(replace(loaded, profile=usb), port, scene, person, pace=pace)
+        outcome = stream_program(replace(loaded, profile=usb), port, scene, person, reach, pace=pace)
         record = printer.record
     if outcome.cancelled:
         return report_end(outcome, scene.log)
@@ -112,10 +112,18 @@ def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person:
 
 
 def stream_program(
-    loaded: LoadedProgram, at: SerialPort, scene: Scene, person: Person, *, begin: Begin | None = None, pace: float | None = 1.0
+    loaded: LoadedProgram,
+    at: SerialPort,
+    scene: Scene,
+    person: Person,
+    reach: Reach,
+    *,
+    begin: Begin | None = None,
+    pace: float | None = 1.0,
 ) -> Outcome:
-    """Stream a program while the user watches and controls it; a resumed print is shown once it begins to print. pace: seconds of
-    the print per second of the clock; None: as fast as possible."""
+    """Stream a program while the user watches and controls it; a resumed print is shown once it begins to print. reach: called
+    with the lines that the printer has acknowledged; pace: seconds of the print per second of the clock, None: as fast as
+    possible."""
     timeline = Timeline(loaded.program.run)
 
     def traffic(direction: str, data: bytes) -> None:
@@ -140,6 +148,7 @@ def stream_program(
 
         def on_progress(status: PrintStatus) -> None:
             if begun:
+                reach(first, status.file_line)
                 ends = status.state is PrintState.CANCELLING
                 left_s = None if ends else time_left_s(timeline.remaining_s, first, status, pace)
                 tell(replace(status, left_s=left_s, layers=timeline.layers(status.part), at=timeline.at(status.file_line)))

@@ -12,7 +12,7 @@ from machine.link.print_state import PrintState, PrintStatus, ProgramPosition, l
 from machine.notices import say, show
 from machine.pipeline.programs import LoadedProgram
 from machine.printing.checks import check_free
-from machine.printing.history import recorded
+from machine.printing.history import Reach, recorded
 from machine.printing.job import DONE, NOT_BEGUN, Does, End, Person, PrintJob, Scene
 from machine.printing.rescue import STOPPED
 from machine.printing.serial_log import SerialLog
@@ -77,9 +77,9 @@ class ServerPrinter:
         """
         if not self._job.starts:
             return self.send(loaded)
-        return recorded(loaded, self.server.name, lambda: self._print(loaded))
+        return recorded(loaded, self.server.name, lambda reach: self._print(loaded, reach))
 
-    def _print(self, loaded: LoadedProgram) -> End:
+    def _print(self, loaded: LoadedProgram, reach: Reach) -> End:
         person, server, upload = self.person, self.server, GcodeUpload(loaded.name, loaded.program.lines)
         try:
             file = hand_over(server, upload, loaded.name, self._scene(), person)
@@ -89,7 +89,7 @@ class ServerPrinter:
         except CancelledError:
             return NOT_BEGUN
         say(LIMITS)
-        return self._follow(file, loaded.name, ReportedProgress(upload, loaded), self._scene())
+        return self._follow(file, loaded.name, ReportedProgress(upload, loaded, reach), self._scene())
 
     def follow(self, now: PrintStatus) -> End:
         """Show a running print until it ends or the user leaves. now: result of running_print().
@@ -185,12 +185,14 @@ def file_name(status: PrintStatus) -> str:
 
 class ReportedProgress:
     """Progress of a print on a server; part and layer follow from how far the server has read a program that is known here. size:
-    of the file, bytes, 0: unknown."""
+    of the file, bytes, 0: unknown. reach: called with the lines that the server has read."""
 
-    def __init__(self, upload: GcodeUpload | None = None, loaded: LoadedProgram | None = None) -> None:
+    def __init__(
+        self, upload: GcodeUpload | None = None, loaded: LoadedProgram | None = None, reach: Reach = lambda first, last: None
+    ) -> None:
         self.line, self.elapsed_s = 0, 0.0
         self.size = 0 if upload is None else len(upload.content)
-        self._upload, self._position = upload, ProgramPosition()
+        self._upload, self._position, self._reach = upload, ProgramPosition(), reach
         self._lines: Sequence[str] = () if loaded is None else loaded.program.lines
         self._timeline = None if loaded is None else Timeline(loaded.program.run)
         self._last_status: PrintStatus | None = None
@@ -212,6 +214,7 @@ class ReportedProgress:
         if self._upload is None or timeline is None:
             return status
         self._read_to(self._upload.line_at(status.bytes_read or 0))
+        self._reach(1, self.line)
         remaining_s = timeline.remaining_s(self.line)
         return replace(
             status,

@@ -128,7 +128,7 @@ def beside(bench: Bench, *, number: int, count: int) -> Bench:
 
 
 def work_on(bench: Bench, *, number: int) -> Bench:
-    """Turn, cut and mark another model on the plate, numbered from 1, from now on."""
+    """Choose another model on the plate, numbered from 1, to turn, cut and mark."""
     return with_other_in_work(bench, check_number("number", number, 1, len(bench.beside)) - 1)
 
 

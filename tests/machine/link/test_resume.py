@@ -3,6 +3,7 @@
 import json
 import re
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -247,6 +248,44 @@ def test_a_print_resumed_after_a_host_crash_keeps_its_z_offset_and_undoes_it_at_
     assert "it must still have the Z offset of +0.1 mm" in way.reason
     assert heights_of_strokes(printer) == {63.1, 63.3}
     assert [line for line in sent if line.startswith(("M290", "M22"))] == ["M220 S100", "M221 S100", "M290 Z-0.100"]
+
+
+def test_a_z_offset_requested_before_a_resumed_print_moves_is_added_to_that_of_the_interrupted_print(text: GcodeFile) -> None:
+    printer, control, shown = VirtualPrinter(PROFILE.machine), Control(), list[float]()
+    story = shifted_then_killed(text, printer)
+    control.ask(Command.BABYSTEP, 0.05)
+    print_lines(
+        text, PATH, medium=printer.medium, profile=PROFILE, control=control,
+        on_progress=lambda status: shown.append(status.z_offset_mm),
+        begin=lambda seen: plan_resume(cut_off(text, story.last), seen, PROFILE),
+    )  # fmt: skip
+    assert max(shown) == 0.15
+    assert 63.35 in heights_of_strokes(printer)
+    assert printer.record.end[-1, 2] == pytest.approx(moved(printer)[-1, 2])
+
+
+def test_a_host_that_dies_before_a_resumed_print_moves_leaves_a_journal_of_what_was_printed(text: GcodeFile) -> None:
+    for writings in range(1, 25):
+        printer = VirtualPrinter(PROFILE.machine)
+        story = killed(text, printer, 233)
+        text.path.with_name("first").unlink()
+        done = story.last.executed
+        printer.medium.wait(1.0)  # a record may be due at once
+        medium = replace(
+            printer.medium,
+            open=lambda name, baud, left=writings: _Mortal(printer.medium.open(name, baud), left),  # noqa: B023
+        )
+        with journal_of(text, f"after {writings}") as journal:
+
+            def begin(seen: PrinterStatus, journal: Journal = journal, last: Checkpoint = story.last) -> ResumePoint:
+                way = plan_resume(cut_off(text, last), seen, PROFILE)
+                journal.write(replace(last, sent=way.line - 1, acknowledged=way.line - 1, executed=way.line - 1))
+                return way
+
+            with suppress(KilledError):
+                print_lines(text, PATH, medium=medium, profile=PROFILE, journal=journal, begin=begin)
+            if journal.last != Checkpoint():  # the printer's position had been queried
+                assert journal.last.executed >= done
 
 
 def test_after_a_power_cut_the_axis_keeps_the_z_offset_which_marlin_does_not_set_before_z_is_homed(text: GcodeFile) -> None:

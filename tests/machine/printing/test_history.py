@@ -12,7 +12,7 @@ from machine.dryrun.dryrun import dry_run
 from machine.link.print_state import PrintState
 from machine.pipeline.programs import LoadedProgram
 from machine.printing import history
-from machine.printing.history import FOLDER, MOST_PRINTS, past_prints, recorded
+from machine.printing.history import FOLDER, MOST_PRINTS, Reach, past_prints, recorded
 from machine.printing.job import DONE, NOT_BEGUN, End
 from machine.program import Program
 from profiles.errors import PrinterError
@@ -37,6 +37,10 @@ def folder() -> Path:
 
 
 def printed(name: str, act: Callable[[], End]) -> End:
+    return printed_to(name, lambda reach: act())
+
+
+def printed_to(name: str, act: Callable[[Reach], End]) -> End:
     return recorded(LoadedProgram(name, Program(LINES, dry_run(LINES, load()), None), load()), "sim", act)
 
 
@@ -46,9 +50,31 @@ def test_prints_are_listed_with_outcome_duration_and_filament_the_newest_first()
     assert printed("bracket", lambda: cancelled) is cancelled
     assert printed("unwanted", lambda: NOT_BEGUN) is NOT_BEGUN
     assert past_prints() == [
-        {"name": "bracket", "port": "sim", "outcome": "cancelled", "begun": 2000.0, "seconds": 5.0, "filament_m": None},
+        {"name": "bracket", "port": "sim", "outcome": "cancelled", "begun": 2000.0, "seconds": 5.0, "filament_m": 0.0},
         {"name": "vase", "port": "sim", "outcome": "done", "begun": 1000.0, "seconds": 90.0, "filament_m": 2.0},
     ]
+
+
+@pytest.mark.parametrize(("first", "last", "filament_m"), [(1, 3, 0.0), (1, 4, 1.5), (1, 5, 2.0), (5, 5, 0.5)])
+def test_a_stopped_print_is_listed_with_the_filament_of_the_lines_that_were_printed(
+    first: int, last: int, filament_m: float
+) -> None:
+    def act(reach: Reach) -> End:
+        reach(first, last)
+        raise PrinterError("the heater is off")
+
+    with pytest.raises(PrinterError):
+        printed_to("vase", act)
+    assert [past["filament_m"] for past in past_prints()] == [filament_m]
+
+
+def test_a_resumed_print_is_listed_with_the_filament_of_its_rest() -> None:
+    def act(reach: Reach) -> End:
+        reach(5, 5)
+        return DONE
+
+    printed_to("vase", act)
+    assert [past["filament_m"] for past in past_prints()] == [0.5]
 
 
 def test_a_print_that_fails_with_an_error_is_listed_as_failed() -> None:

@@ -50,7 +50,7 @@ def test_g_code_with_errors_is_saved_only_for_who_wants_it_all_the_same(tmp_path
     known = known_findings(["G28"], profile(), [error])
     sliced = Sliced(tmp_path / "page", tmp_path / "gcode", "key", 60.0, 1.0, known, cost)
     session: Any = SimpleNamespace(slicing=SimpleNamespace(needed=lambda: SimpleNamespace(sliced=sliced)))
-    session.bench = SimpleNamespace(model=SimpleNamespace(name="demo:tree"))
+    session.bench = SimpleNamespace(plate=[SimpleNamespace(model=SimpleNamespace(name="demo:tree"))])
     refused, forced = (Request({"type": "http", "query_string": query}) for query in (b"", b"force=yes"))
     with pytest.raises(PlanError, match="found 1 error, the first: the nozzle touches the part: no G-code is saved unless"):
         asyncio.run(gcode(session, refused))

@@ -51,7 +51,7 @@ export function lineAt(path, heard, stands) {
 export const whyUnanswered = () => fetch("", { method: "HEAD", signal: AbortSignal.timeout(AGAIN_MS) }).then(
   ({ status }) => ({ 403: "unpaired", 404: "replaced" }[status] || "lost"), ({ name }) => (name === "TimeoutError" ? "lost" : "ended"));
 
-let line = null, asked = new Map(), count = Date.now(); // count: above that of the page before a reload; asked: callbacks by the name of their command
+let line = null, asked = new Map(), savedTimer = 0, count = Date.now(); // savedTimer: ends the notice about a saved file; count: above that of the page before a reload; asked: callbacks by the name of their command
 const kept = keptInTab("page", { name: "" });
 /** This page's unique name, which no copy of its tab has: only a reload passes it on, and with it the control of its prints. */
 export const OWN_PAGE = kept.now.name || crypto.getRandomValues(new Uint32Array(3)).join("-"); // without HTTPS there is no randomUUID
@@ -101,8 +101,6 @@ export function newest({ read, take, insists = false, begin = () => {} }) {
     take(content, key);
   };
 }
-
-let savedTimer = 0;
 
 /** Let the browser save the file that the server creates at an address. */
 export async function save(address) {
