@@ -23,7 +23,7 @@ from profiles.folders import state_folder
 FOLDER = "prints"
 MOST_PRINTS = 100  # files that are kept, the newest ones
 LOCKED_WITHIN_S = 1.0
-Reach = Callable[[int, int], None]  # told the first and the last line of the program that have been printed so far
+Reach = Callable[[int, int], None]  # called with the first and last printed line of the program
 NOT_PRINTED = (PrintState.DECLINED, PrintState.REFUSED)
 
 

@@ -57,7 +57,7 @@ def test_each_part_has_its_shape_its_layers_and_its_time() -> None:
     table = tables(example()[1])["Parts"]
     assert table["head"] == ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²", "layers", "time", "g"]
     assert [row[0] for row in table["rows"]] == ["1", "2"]
-    assert table["rows"][1][3:7] == ["1.00", "100.0", "0.0", "3"]
+    assert table["rows"][1][3:7] == ["1.00", "100", "0.0", "3"]
 
 
 def test_a_file_without_parts_and_layers_is_told_as_a_whole() -> None:
@@ -93,7 +93,7 @@ def test_joints_of_a_sliced_model_tell_contact_and_plastic_those_of_g_code_nothi
     report = print_report(program, profile, *sums_of(program.run), joints=joints_of_print(program, profile))
     joints = next(table for table in report["tables"] if table["title"] == "Joints")
     assert joints["head"][:5] == ["part", "mm²", "contact %", "plastic %", "seam mm"]
-    assert joints["rows"][0][:4] == ["2", "100.0", *laid]
+    assert joints["rows"][0][:4] == ["2", "100", *laid]
     assert joints["notes"][-1] == "the weakest: the joint of part 2"
     alone = tables(replace(program, decomposition=None))["Joints"]
     assert (alone["head"], alone["rows"]) == (["part", "mm²", *LAID], [["2", f"{face.area_mm2:.1f}", *laid]])

@@ -2,20 +2,22 @@
 
 import { $, hide, listen, onData, tell, toggle } from "../elements.js";
 
+const LEAST_PANEL_PX = 200; // width of the workbench's own panel, beside which this page is shown while a print is followed
+
 /** Messages of the workbench: {tiltprint: "finding", finding}, {..: "line", line}, {..: "text", text: a file}, {..: "theme", dark}, {..: "view", yaw, pitch in radians}; the last one is sent back when the view turns. */
 export function outsideOf({ scene, findings, code, chooseTheme, camera, bells }) {
   if (parent === window || location.origin === "null") return;
+  const besidePanel = () => toggle("beside", parent.innerWidth > innerWidth + LEAST_PANEL_PX);
   toggle("inside", true);
+  besidePanel();
+  addEventListener("resize", besidePanel);
   const say = (word, more = {}) => parent.postMessage({ tiltprint: word, ...more }, location.origin);
   const heard = {
     finding: ({ finding }) => findings.open(finding),
     line: ({ line }) => scene.goToLine(line),
     text: ({ text }) => code.take(text),
     theme: ({ dark }) => chooseTheme(dark),
-    view: ({ yaw, pitch }) => {
-      Object.assign(camera, { yaw, pitch });
-      bells.ring("look");
-    },
+    view: ({ yaw, pitch }) => { Object.assign(camera, { yaw, pitch }); bells.ring("look"); },
   };
   addEventListener("message", ({ data, origin, source }) => {
     if (source === parent && origin === location.origin) heard[data?.tiltprint]?.(data);

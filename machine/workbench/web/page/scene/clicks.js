@@ -47,10 +47,7 @@ function partMet(event, picture) {
 /** Pointer actions on the canvas, for `handle`; a double click centres the place, and Enter does there what a click would. */
 export function handsOf(camera, picture) {
   const canvas = $("canvas"), brush = brushOf(picture), measure = measureOf(picture);
-  const widen = (by) => () => {
-    $("brush-radius").value = numberIn("brush-radius") * by;
-    $("brush-radius").dispatchEvent(new Event("input"));
-  };
+  const widen = (by) => () => { $("brush-radius").value = numberIn("brush-radius") * by; $("brush-radius").dispatchEvent(new Event("input")); };
   const clicked = (event) => (store.clicks === "measure" && !apartNow() ? measure.press(event) : press(event, picture));
   canvas.addEventListener("pointermove", (event) => { if (!event.buttons) [brush, measure].forEach(({ hover }) => hover(event)); });
   canvas.addEventListener("dblclick", (event) => {

@@ -124,10 +124,10 @@ export function wallsOf(picture) {
   let number = 0, asked = new Set(); // slices whose walls are loaded or requested
   const fetchPart = async (part, of) => {
     asked.add(part);
-    const answer = await fetch(`walls/${of}/${part}`).catch(() => null);
+    const answer = await fetch(`walls/${of}/${part}`).catch(() => null), content = answer?.ok ? await answer.arrayBuffer() : null;
     if (number !== of) return;
     if (!answer) asked.delete(part); // the connection is lost: the next state requests it again
-    if (answer?.ok) update({ walls: new Map(store.walls).set(part, bandsOf(await answer.arrayBuffer(), store.state.colours[part - 1] || PLAIN)) });
+    if (content) update({ walls: new Map(store.walls).set(part, bandsOf(content, store.state.colours[part - 1] || PLAIN)) }); // nothing is awaited here: another part may arrive meanwhile
   };
   subscribe(({ state: { slicing, sliced }, tab, triangles }) => {
     const slices = tab !== "slices" ? null : slicing || (sliced && !sliced.stale ? sliced : null);
