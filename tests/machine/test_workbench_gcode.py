@@ -5,11 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.conftest import small_browser
 from tests.machine.prints import commands_sent, prints_line
 from tests.machine.running_workbench import QUICK, Running, workbench
 from tests.machine.test_workbench_page import choose
+from tests.shapes import box
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
@@ -57,6 +59,24 @@ def test_a_dropped_file_with_errors_shows_them_and_is_refused_like_print(tmp_pat
         browser.click("#check")
         browser.wait("!$('print-problem').hidden && !$('force-line').hidden")
         assert "5000" in browser.value("$('print-problem').textContent")
+
+
+def test_a_model_that_is_opened_closes_the_g_code_file(tmp_path: Path) -> None:
+    (tmp_path / "box.gcode").write_text(GOOD)
+    (tmp_path / "box.stl").write_bytes(stl(box(8, 8, 8)))
+    with workbench(*QUICK) as running, running.line() as page:
+        running.send(tmp_path / "box.gcode")
+        page.until(lambda state: state["gcode"])
+        running.send(tmp_path / "box.stl")
+        page.until(lambda state: state["model"] and state["gcode"] is None)
+
+
+def test_a_file_of_another_kind_is_refused_with_the_kinds_that_can_be_opened(tmp_path: Path) -> None:
+    (tmp_path / "photo.jpg").write_bytes(b"JFIF")
+    with workbench(*QUICK) as running:
+        status, text = running.send(tmp_path / "photo.jpg")
+        assert status == 422
+        assert all(kind in text for kind in (b"photo.jpg: models (.stl", b"G-code (", b".gcode", b"plans and profiles (.toml)"))
 
 
 def test_a_file_without_moves_is_refused_with_its_name(tmp_path: Path) -> None:

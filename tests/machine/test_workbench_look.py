@@ -149,7 +149,7 @@ def test_a_part_has_a_card_that_the_keyboard_chooses_and_locks(browser: Browser,
     browser.wait("$('parts-list').textContent.includes('breaks at about')")
     card = browser.value("$('parts-list').children[1].innerText").split("\n")
     assert card[:2] == ["Part 2", "straight up"]
-    assert card[2:8] == ["volume", "5.00 cm³", "support", "300.0 mm²", "seam", "40 mm"]
+    assert card[2:8] == ["volume", "5.00 cm³", "support", "300 mm²", "seam", "40 mm"]
     browser.value("document.querySelector('#parts-list [value=\"2\"]').focus()")
     browser.value("document.querySelector('#parts-list [value=\"1\"]').click()")  # as an arrow key does
     assert browser.value("document.activeElement.value") == "1"
@@ -181,6 +181,16 @@ def test_the_tools_stand_in_the_picture_hide_no_knob_and_say_why_a_plane_is_refu
     browser.click("#put-aside")
     browser.wait("!$('plane-told').classList.contains('refused') && !$('put-near').checkVisibility()")
     browser.resize(*SMALL)
+
+
+def test_a_refusal_ends_when_another_part_is_chosen(browser: Browser, bench: Running) -> None:
+    with_plane(browser, bench)
+    drag_slider(browser, "plane-offset", 39.95, "change")
+    browser.wait("$('plane-told').classList.contains('refused')")
+    browser.click("#parts-list [value='1']")
+    browser.wait("!modules['page/store'].store.state.refused && $('problem').hidden")
+    browser.click("#parts-list [value='2']")
+    assert not browser.value("$('plane-told').classList.contains('refused') || $('put-near').checkVisibility()")
 
 
 def test_the_list_of_steps_goes_back_and_forth_by_several(browser: Browser, bench: Running) -> None:

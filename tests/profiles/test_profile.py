@@ -89,7 +89,7 @@ def test_a_share_is_also_read_as_a_percentage() -> None:
         ("machine.tilt.colour=3", "machine.tilt.colour is not a key of a profile (`profiles show` lists them)"),
         ("process.layer_height_mm=5", "process.layer_height_mm is 5: it must be a number from 0.02 to 2"),
         ("process.layer_height_mm=nan", "process.layer_height_mm is nan: it must be a number from 0.02 to 2"),
-        ("process.scale=0", "process.scale is 0: it must be a number above 0 and up to 100000"),
+        ("process.scale=0", "process.scale is 0: it must be a number above 0 and up to 100000 or a percentage"),
         ("process.bridge_longest_mm=0", "process.bridge_longest_mm is 0: it must be a number from 1 to 100"),
         ("search.least_volume_share=1", "search.least_volume_share is 1: it must be a number from 0 and below 1 or a percentage"),
         ("process.walls=2.5", "process.walls is 2.5: it must be a whole number from 0 to 50"),

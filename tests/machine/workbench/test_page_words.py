@@ -28,7 +28,7 @@ PAIRS = [
     (f"{option('copies', 3)}: a.gcode is G-code", "3 copies: a.gcode is G-code"),
     (f"{option('ranker', 'x')}: classic, learned or the name", "Search ranking x: classic, learned or the name"),
     (f"{advice('filament-change', '1:x')}: PART:LAYER or", "1:x under Copies and pauses: PART:LAYER or"),
-    (f"give them up, {advice('set', 'process.scale=25.4', 'give')}", "give them up, set Scale of the model to 25.4"),
+    (f"give them up, {advice('set', 'process.scale=25.4', 'give')}", "give them up, set Scale of the model to 2540 %"),
     (f"{option('set', 'process.walls=4')} and", "Walls = 4 and"),
     (f"X (lists all, {FORCE_GOES_ON})", "X (lists all, tick Continue anyway to print it)"),
     (f"{key_name('machine.tilt.limits_deg')} is [5, 3]", "Tilt axis: Range is [5, 3]"),

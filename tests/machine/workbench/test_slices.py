@@ -19,6 +19,7 @@ from machine.workbench.work.slices import Sliced, open_gcode, walls
 from profiles.errors import PlanError
 from profiles.profile import load
 from slicer.slice import slice_parts
+from tests.machine.pages import opened
 from tests.shapes import box
 from tests.slicer.hand import cut, profile
 
@@ -97,6 +98,15 @@ def test_what_hangs_gets_a_button_that_switches_support_on_where_it_is_off() -> 
 def test_slices_of_another_bench_are_to_be_made_again() -> None:
     verdict = verdict_of((CRASH,), load(), 0.0, out_of_date=True)
     assert (verdict["kind"], verdict["remedy"]) == ("stale", SLICE_AGAIN)
+
+
+def test_the_page_of_a_gcode_file_without_a_machine_lists_every_error_of_the_machine_it_is_tried_for(tmp_path: Path) -> None:
+    file = tmp_path / "far.gcode"
+    file.write_text("G21\nG90\nM83\nG28\nM104 S210\nM109 S210\nG1 Z0.3 F600\nG1 X9999 E1 F600\nM104 S0\n")
+    tried = open_gcode(print, ModelRequest(str(file), load()), tmp_path / "page", tmp_path / "copy")
+    listed = {finding["message"] for finding in opened(tried.page.read_bytes())[0]["findings"] if finding["severity"] == "error"}
+    assert len(listed) == len(tried.errors) > 0
+    assert any("9999" in message for message in listed)
 
 
 def test_a_gcode_file_that_is_tried_for_another_machine_has_another_page(tmp_path: Path) -> None:
