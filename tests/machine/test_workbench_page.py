@@ -178,7 +178,7 @@ def test_a_model_of_a_size_that_no_printer_makes_is_asked_for_its_unit_and_opene
 def test_a_small_model_has_a_button_that_takes_its_coordinates_as_inches(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "small.stl", stl(Mesh(tee().vertices / 25.4, tee().faces)))
     assert "its longest side is 1.57 mm: if its coordinates are inches" in browser.value("$('model-notes').textContent")
-    assert browser.value("$('remedies').textContent") == "Set Scale of the model to 25.4"
+    assert browser.value("$('remedies').textContent") == "Set Scale of the model to 2540 %"
     browser.click("#remedies button")
     browser.wait("$('size-z').value === '40.00' && !$('remedies').childElementCount")
 
@@ -231,7 +231,9 @@ def test_work_that_takes_longer_than_a_moment_tells_how_long_it_is_under_way(bro
     under_way = "(({ store, update }) => update({ state: { ...store.state, busy: 'reading big.stl' } }))(modules['page/store'])"
     at_once = f"({under_way}, [$('summary').textContent, $('summary').dataset.elapsed])"  # before updates from the server
     assert browser.value(at_once) == ["reading big.stl …", ""]
-    browser.wait(f"({under_way}, /^ [2-9]s$/.test($('summary').dataset.elapsed))")  # again after updates that are still arriving
+    browser.wait(
+        f"({under_way}, /^ \\([2-9]s\\)$/.test($('summary').dataset.elapsed))"
+    )  # again after updates that are still arriving
 
 
 def test_a_typed_angle_turns_the_model_and_its_size_is_that_of_how_it_stands(browser: Browser, bench: Running) -> None:

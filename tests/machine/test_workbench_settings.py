@@ -175,7 +175,7 @@ def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_comm
     assert browser.value("$('profiles-list').querySelector('select').value") == "mine.toml"
     assert browser.value("$('undo').getAttribute('aria-label')") == "undo: take mine.toml"
     browser.click("#undo")
-    browser.wait("$('undo').getAttribute('aria-label') === 'undo: set machine.head.silhouette_mm'")
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: set Print head: Silhouette of the hot end'")
     browser.click("#undo")
     browser.wait(f"!{changed('machine.head.silhouette_mm')} && {changed('machine.gcode.before_part')}")
     assert browser.complaints == []

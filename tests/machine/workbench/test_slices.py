@@ -27,7 +27,7 @@ SIDE = (1.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("most", [60_000, 100])
-def test_the_walls_of_a_part_lie_on_its_surface_wherever_it_is_printed_to(most: int) -> None:
+def test_the_walls_of_a_part_are_on_its_surface_in_every_printing_direction(most: int) -> None:
     parts = cut(box(30, 10, 10), (SIDE, 5.0))
     values = np.frombuffer(walls(parts[1], slice_parts(parts, profile())[1], most), "<f4")
     pieces = values[3:].reshape(-1, 7)
@@ -45,7 +45,7 @@ def test_the_walls_of_a_part_lie_on_its_surface_wherever_it_is_printed_to(most: 
     assert (np.median(from_middle_mm) < 4.6) == (most != 100)  # inner walls where there is room for them
 
 
-def test_g_code_with_errors_is_saved_only_for_who_wants_it_all_the_same(tmp_path: Path) -> None:
+def test_g_code_with_errors_is_saved_only_after_confirmation(tmp_path: Path) -> None:
     error = Finding("error", "contact", 12, 1, 3, "the nozzle touches the part")
     cost = Alternative("in 1 part", "", 1, 60.0, 1.0, 1.0, 0.0, 0.0)
     known = known_findings(["G28"], profile(), [error])
@@ -87,7 +87,7 @@ def test_the_first_error_is_the_problem_and_says_which_finding_it_is() -> None:
     assert verdict_of((CRASH,), load(), 0.0, out_of_date=False)["text"] == "1 problem: the nozzle touches the part"
 
 
-def test_what_hangs_gets_a_button_that_switches_support_on_where_it_is_off() -> None:
+def test_overhangs_without_support_get_a_button_that_switches_support_on() -> None:
     off = load(settings=["process.support=none"])
     verdict = verdict_of((UNCALIBRATED,), off, 812.4, out_of_date=False)
     assert (verdict["text"], verdict["remedy"]) == ("Ready to print, but 812 mm² would need support", SUPPORT_ON)

@@ -138,7 +138,7 @@ export function thumbnailsOf(picture) {
     const held = $("resting").contains(document.activeElement); // the pressed button was focused, so focus the current one
     $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area, present }) => {
       const lay = () => { update({ clicks: "" }); send({ do: "stand", rotation }); };
-      return button("", lay, { ariaPressed: String(present) }, drawn ? thumbnail(rotation) : "", made("span", { text: words }), made("small", { text: mm2(area) }));
+      return button("", lay, { ariaPressed: String(present) }, drawn ? thumbnail(rotation) : "", made("span", { text: words }), made("small", { text: `${mm2(area)} overhanging` }));
     }));
     if (held) $("resting").querySelector("[aria-pressed=true]")?.focus();
     hide({ laid: !views.length });
