@@ -277,7 +277,7 @@ def test_the_front_is_shown_with_dashes_where_nothing_is_estimated(choices: Brow
     lines = choices.value(
         "[...document.querySelectorAll('#front tbody tr')].map((line) => [...line.cells].map((c) => c.textContent))"
     )
-    assert lines[0] == ["1", "100.0", "0", "30.4", "–", "–"]
+    assert lines[0] == ["1", "100", "0", "30.4", "–", "–"]
     assert lines[1] == ["2✓", "0.0", "40", "0.0", "1h 7m", "1.2"]
     assert text(choices, "front-told") == "✓ chosen for the lowest cost."
 

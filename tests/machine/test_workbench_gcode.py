@@ -28,7 +28,7 @@ def opened(browser: Browser, running: Running, name: str, content: str) -> None:
     browser.wait(f"['ready', 'failed'].includes({VIEW}?.documentElement?.dataset.state) && !$('print-page').hidden")
 
 
-def test_a_dropped_file_is_looked_at_and_printed_as_it_is(tmp_path: Path) -> None:
+def test_a_dropped_file_is_shown_and_printed_unchanged(tmp_path: Path) -> None:
     with workbench(*QUICK) as running, small_browser() as browser, prints_line(running, "watching") as page:
         opened(browser, running, "box.gcode", GOOD)
         assert browser.value(f"{VIEW}.getElementById('title').textContent") == "box.gcode"
@@ -86,7 +86,7 @@ def test_a_file_without_moves_is_refused_with_its_name(tmp_path: Path) -> None:
         assert (status, b"empty.gcode holds no move: there is nothing to show" in text) == (422, True)
 
 
-def test_a_file_that_does_not_tell_its_machine_is_tried_for_that_of_the_settings(tmp_path: Path) -> None:
+def test_a_file_without_a_machine_is_dry_run_for_that_of_the_settings(tmp_path: Path) -> None:
     (tmp_path / "box.gcode").write_text(GOOD)
     with workbench(*QUICK) as running, running.line() as page:
         running.send(tmp_path / "box.gcode")

@@ -64,9 +64,7 @@ def red_share(browser: Browser) -> float:
     return float(((red > 130) & (green < 70) & (blue < 70)).mean())
 
 
-def test_models_without_a_place_are_drawn_in_red_beside_the_plate_and_nothing_can_be_sliced(
-    browser: Browser, bench: Running
-) -> None:
+def test_models_without_a_place_are_red_beside_the_plate_and_cannot_be_sliced(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "crowd.stl", stl(box(60, 60, 20)))
     browser.click("#tab-slices")
     assert red_share(browser) == 0.0

@@ -67,7 +67,7 @@ def test_a_low_clip_far_out_leaves_both_poses_and_one_beside_the_part_is_named()
     assert reason == "the head's hot end would meet the plate's clip"
 
 
-def test_the_post_beside_the_part_would_be_met_at_every_pose() -> None:
+def test_a_post_beside_the_part_would_collide_in_every_pose() -> None:
     beside = with_post(MACHINE, 10.0, 200.0)
     free = allowed_poses(MACHINE.model_copy(update={"cradle": []}), LEANING, PART)
     assert [meet(beside, pose) for pose in free] == [True, True]

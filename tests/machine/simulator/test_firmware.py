@@ -337,7 +337,7 @@ def test_endstops_are_touched_after_homing() -> None:
     assert answer(firmware, "M119\n")[1:4] == ["x_min: TRIGGERED", "y_min: TRIGGERED", "z_max: TRIGGERED"]
 
 
-def test_homing_takes_as_long_as_the_way() -> None:
+def test_homing_takes_as_long_as_its_distance() -> None:
     firmware = printer()
     answer(firmware, "G28\nG1 X100 F9000\nM400\n")
     began_s = firmware.board.now_s
@@ -366,7 +366,7 @@ def test_a_heater_that_fails_in_the_print_is_a_thermal_runaway() -> None:
     assert firmware.record().nozzle_target_c == 0.0
 
 
-def test_a_failed_heater_that_is_off_harms_nobody() -> None:
+def test_a_failed_heater_that_is_off_causes_no_error() -> None:
     firmware = printer()
     firmware.board.bed.fail(0.0)
     assert answer(firmware, "G4 S500\n")[-1] == "ok"

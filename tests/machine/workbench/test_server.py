@@ -139,7 +139,7 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
     assert main(["decompose", "tee.stl", *QUICK, "--set=search.seam_mm=100", "--ranker", "learned", "-o", "parts"]) == 0
     with bench.line() as page:
         page.do("set", key="search.seam_mm", value="100")  # too expensive to cut
-        page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
+        page.until(lambda state: state["undo"] == "set Width of a seam's blemish" and not state["busy"])
         bench.send(folder / "tee.stl")
         page.do("search", ranker="none")
         assert "Search ranking none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
@@ -156,7 +156,9 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
         page.do("undo")
         page.until(lambda state: state["rotation"] == as_it_lies["rotation"] and state["front"] == as_it_lies["front"])
         page.do("set", key="search.seam_mm", value="0.8")
-        page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])  # the next test shares this bench
+        page.until(
+            lambda state: state["undo"] == "set Width of a seam's blemish" and not state["busy"]
+        )  # the next test shares this bench
 
 
 @pytest.mark.parametrize("kept", ["turned", "locked", "marked", "set"])
@@ -178,7 +180,7 @@ def test_a_search_keeps_the_orientation_of_a_model_that_was_turned_locked_or_mar
             page.do("lock", part=2, locked=True)
         words = {
             "turned": "turn the model",
-            "set": "set search.objective",
+            "set": "set Objective",
             "marked": "mark: no seam here",
             "locked": "lock a plane",
         }
