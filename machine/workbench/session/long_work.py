@@ -25,9 +25,9 @@ ENDED = "slicing was stopped, for the model on the workbench has changed: slice 
 REPLACED = "your planes were replaced: Undo brings them back"
 
 
-class Finding(Derived[tuple[Found, ...]]):
-    """Search for the parts of the bench's model, then of each other model on the plate that is not cut; cancelled when one of
-    these, its orientation, settings, marks or locked planes change.
+class Finding(Derived[tuple[tuple[Bench, Found], ...]]):
+    """Search for the parts of the bench's model, then of each other model on the plate that is not cut; cancelled when the
+    bench's model, its orientation, settings, marks or locked planes change.
 
     laid: the rotations before and after it."""
 
@@ -36,7 +36,7 @@ class Finding(Derived[tuple[Found, ...]]):
         self._how = True, CLASSIC
         super().__init__(
             session,
-            lambda bench: None if bench.model is None else (bench.sought, locked_plan(bench).parts, _uncut(bench)),
+            lambda bench: None if bench.model is None else (bench.sought, locked_plan(bench).parts),
             self._find,
             by_itself=False,
             interrupts=True,
@@ -49,21 +49,22 @@ class Finding(Derived[tuple[Found, ...]]):
             self._how = orient, ranker
             self.begin(Searched(WAITING if self._session.long.pool.full else "beginning"))
 
-    async def _find(self, bench: Bench) -> tuple[Found, ...]:
-        tell, found = self.teller(), list[Found]()
+    async def _find(self, bench: Bench) -> tuple[tuple[Bench, Found], ...]:
+        tell, found = self.teller(), list[tuple[Bench, Found]]()
         best: FrontRow | None = None
 
         def follow_other(name: str, searched: Searched) -> None:
             tell(Searched(f"{name}: {searched.text}", best))
 
-        found.append(await self._session.long.run(find_parts, bench, *self._how, tell=tell))
-        if found[0].turn is None:
-            best = next(row for row in found[0].front if row.chosen)
+        own = await self._session.long.run(find_parts, bench, *self._how, tell=tell)
+        found.append((bench, own))
+        if own.turn is None:
+            best = next(row for row in own.front if row.chosen)
         for other in bench.beside:
             if other.cuts is None and other.model is not None:
                 follow = partial(follow_other, other.model.name)
                 with naming_model(other):
-                    found.append(await self._session.long.run(find_parts, other, *self._how, tell=follow))
+                    found.append((other, await self._session.long.run(find_parts, other, *self._how, tell=follow)))
         return tuple(found)
 
     def interrupted(self) -> None:
@@ -81,18 +82,16 @@ class Finding(Derived[tuple[Found, ...]]):
         used = f"The search was stopped; the best so far is used: {best.parts} parts"
         return f"{used}; {REPLACED}." if _replaces_planes(now, taken) else f"{used}."
 
-    def _accept_found(self, found: tuple[Found, ...]) -> None:
-        now, (own, *further) = self._session.bench, found
-        of_others = iter(further)
-        others = tuple(_with_found(other, next(of_others)) if other.cuts is None else other for other in now.beside)
-        after = replace(_with_found(now, own), beside=others)
+    def _accept_found(self, found: tuple[tuple[Bench, Found], ...]) -> None:
+        now, ((_, own), *further) = self._session.bench, found
+        others = list(now.beside)
+        for searched, parts in further:  # others may have been added, changed or removed meanwhile
+            for k, other in enumerate(others):
+                if other.cuts is None and other.sought == searched.sought:
+                    others[k] = _with_found(other, parts)
+        after = replace(_with_found(now, own), beside=tuple(others))
         self.laid = None if after.rotation == now.rotation else (now.rotation, after.rotation)
         self._session.do("find parts", after, REPLACED if _replaces_planes(now, after) else "")
-
-
-def _uncut(bench: Bench) -> tuple[object, ...]:
-    """Everything that determines the parts found for the other models, which are not cut yet."""
-    return tuple(other.sought for other in bench.beside if other.cuts is None)
 
 
 def _with_found(bench: Bench, found: Found) -> Bench:

@@ -261,15 +261,15 @@ class Session(SessionBase):
         profile = profile_as_given(project.given, self.bench.profile.of_all_parts)
         check_block(profile, "")
         with self.waiting(f"reading {project.name}"):
-            first, *others = [await self._bench_of_model(each, profile) for each in (project, *project.beside)]
+            first, *others = [await self._bench_of_model(each, profile, project.given) for each in (project, *project.beside)]
         bench = with_beside(replace(first, stops=project.stops), tuple(others))
         return with_other_in_work(bench, project.worked_on - 1) if project.worked_on else bench
 
-    async def _bench_of_model(self, project: Project, profile: Profile) -> Bench:
+    async def _bench_of_model(self, project: Project, profile: Profile, given: Given) -> Bench:
         """A bench for one of the models of a project. Raises UserError."""
         plan = None if project.plan is None else replace(_read_plan(project.plan), name="")
         model = await self._read(await self._copy_of(project.name, project.model), project.name, profile, project.plate)
-        uncut = with_model(Bench(profile, given=project.given), model)
+        uncut = with_model(Bench(profile, given=given), model)
         bench = with_rotation(uncut, project.rotation)
         if plan is not None:
             marks = NO_ZONES if project.marks_in_plan else bench.zones

@@ -168,6 +168,21 @@ def test_parts_are_found_for_all_models_on_the_plate_that_are_not_cut(bench: Run
         page.until(lambda state: not state["parts"] and not state["beside"][0]["parts"])
 
 
+def test_all_models_of_an_opened_project_have_its_profile_files(bench: Running, folder: Path) -> None:
+    (folder / "mine.toml").write_text('inherits = "standard"\n[process]\nname = "mine"\nwalls = 5\n')
+    with bench.line() as page:
+        bench.send(folder / "box.stl")
+        add(bench, folder / "tee.stl")
+        bench.send(folder / "mine.toml")
+        page.until(lambda state: state["process"] == "mine" and on_plate(state) == [("tee.stl", 1)])
+        (folder / "plate.3mf").write_bytes(bench.ask("project.3mf")[1])
+        bench.send(folder / "plate.3mf")
+        given = page.until(lambda state: state["undo"] == "open plate.3mf")["given"]
+        page.do("work_on", number=1)
+        other = page.until(lambda state: state["model"]["name"] == "tee.stl")
+        assert (other["given"], other["process"]) == (given, "mine")
+
+
 def test_a_project_of_an_older_version_opens_with_its_other_models_uncut(folder: Path) -> None:
     names: tuple[None, ...] = (None, None, None)
     plate = ModelRequest("tee.stl", load(), profile_names=names, parts=1, orient=False, beside=("box.stl", "box.stl"))

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from machine.pipeline.requests import Given
-from machine.workbench.bench.bench import Bench, with_cuts, with_front, with_profile
+from machine.workbench.bench.bench import Bench, with_beside, with_cuts, with_front, with_profile
 from machine.workbench.session.base import hear_from
 from machine.workbench.session.commands import obey, redo, undo
 from machine.workbench.session.session import Session, Workbench
@@ -568,6 +568,25 @@ def test_a_search_that_begins_while_another_one_is_being_stopped_continues() -> 
 
     session = when_done(work)
     assert (session.bench.parts, session.finding.progress) == (2, None)
+
+
+def test_a_model_added_during_a_search_neither_stops_it_nor_gets_the_parts_of_another() -> None:
+    found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
+
+    async def work(session: Session) -> None:
+        async def find(task: Any, bench: Bench, *given: Any, **more: Any) -> Any:
+            if bench.model is session.bench.model:
+                session.do("add c", with_beside(session.bench, (*session.bench.beside, Bench(session.bench.profile, model("c")))))
+            return Found((found,), ())
+
+        session.do("add b", with_beside(session.bench, (Bench(session.bench.profile, model("b")),)))
+        session.long.run = find  # type: ignore[method-assign]
+        obey(session, {"do": "search"})
+        await session.finding.wait()
+        await asyncio.sleep(0)
+        await session.finding.wait()
+
+    assert [each.parts for each in when_done(work).bench.plate] == [2, 2, 0]
 
 
 def test_a_stop_ends_the_search_at_once_though_a_command_before_it_is_still_executed() -> None:
