@@ -78,12 +78,11 @@ class Feed:
         """Feed the program from its beginning, or from the resume point of an interrupted print, to the final barrier."""
         exchange = self.exchange
         self._shifts_z = resume_point is None or resume_point.shifts_z
-        if not (self._shifts_z and exchange.connection.greeting.capabilities.get("BABYSTEPPING", True)):
-            self.pending.babystep = ""
+        can_shift = self._shifts_z and exchange.connection.greeting.capabilities.get("BABYSTEPPING", True)
+        babystep = self.pending.babystep if can_shift else ""
         if resume_point is not None:
-            resume_point.check_offset(self.pending.babystep)
-            self.pending.z_offset_mm = round(self.pending.z_offset_mm + resume_point.z_offset_mm, 3)  # the user may have shifted
-            self.pending.sent_offset_mm = resume_point.z_offset_mm
+            resume_point.check_offset(babystep)
+        self.pending.begin_offset(babystep, 0.0 if resume_point is None else resume_point.z_offset_mm)
         self.started, self.history = True, self._new_history(0 if resume_point is None else resume_point.line - 1)
         if exchange.connection.greeting.capabilities.get("AUTOREPORT_TEMP"):
             exchange.send(f"M155 S{REPORT_S}")

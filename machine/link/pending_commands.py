@@ -141,6 +141,16 @@ class PendingCommands:
             if not command_in(command).moves:
                 modal.take(command)
 
+    def begin_offset(self, babystep: str, offset_mm: float) -> None:
+        """Note the firmware's command for a Z offset, now that it is known, and the offset of an interrupted print. Requests that
+        turn out to be impossible are dropped with a message."""
+        before, _, after = self.babystep.partition("{}")
+        wanted_mm = round(self.z_offset_mm + offset_mm, 3)
+        if self.z_offset_mm and (refusal := offset_refusal(wanted_mm, babystep)):
+            kept = (line for line in self.lines if not (line.startswith(before) and line.endswith(after)))
+            self.lines, wanted_mm, self.message = deque(kept), offset_mm, refusal
+        self.babystep, self.z_offset_mm, self.sent_offset_mm = babystep, wanted_mm, offset_mm
+
     def end_pause(self) -> None:
         """Note the end of the pause."""
         self.pause_s, self.resume = None, False

@@ -77,6 +77,25 @@ def test_steps_below_a_micrometre_do_not_pass_the_limit_unseen() -> None:
     assert round(sent_mm, 3) == pending.z_offset_mm <= 2.0
 
 
+@pytest.mark.parametrize(
+    ("known", "resumed_mm", "asked_mm", "offset_mm", "lines"),
+    [
+        ("M290 Z{}", 0.1, 0.05, 0.15, ["M220 S90", "M290 Z0.050"]),
+        ("M290 Z{}", 1.5, 1.0, 1.5, ["M220 S90"]),  # more than 2 mm in all
+        ("", 0.0, 0.05, 0.0, ["M220 S90"]),  # the firmware turns out to have no babystepping
+    ],
+)
+def test_a_z_offset_requested_before_the_print_begins_is_added_or_dropped_with_a_message(
+    known: str, resumed_mm: float, asked_mm: float, offset_mm: float, lines: list[str]
+) -> None:
+    pending = PendingCommands(axes_of(None), babystep="M290 Z{}")
+    for command, value in ((Command.FEED, 90.0), (Command.BABYSTEP, asked_mm)):
+        pending.accept(PendingCommand(command, value), PrintState.PRINTING, 0.0)
+    pending.begin_offset(known, resumed_mm)
+    assert (pending.z_offset_mm, pending.sent_offset_mm, list(pending.lines)) == (offset_mm, resumed_mm, lines)
+    assert (pending.message != "") == (len(lines) == 1)
+
+
 def test_a_z_offset_requested_while_a_print_finishes_is_neither_sent_nor_taken_back() -> None:
     watcher = watched({len(PROGRAM) - 4: (Command.BABYSTEP, -0.05)})  # as the last commands fill the window
     watcher.run(PROGRAM)
