@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -89,7 +88,7 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
     for given_both, sentence in clashes:
         if given_both:
             raise PlanError(sentence)
-    file = plan or planes or _plan_of_demo(request)
+    file = plan or planes
     given = None if file is None else read_plan(file)
     if file is not None and given is not None and request.project is not None and (file.parent / RECORD).is_file():
         given = replace(given, name=request.project.name)  # the user has no other file of it
@@ -98,10 +97,12 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
     return given
 
 
-def _plan_of_demo(request: ModelRequest) -> Path | None:
-    """The plan shipped with a demo, unless the user wants other parts or another orientation."""
-    otherwise = request.parts is not None or request.orient or request.outputs.record is not None
-    return None if otherwise else plan_beside(request.model)
+def with_plan_of_demo(request: ModelRequest) -> ModelRequest:
+    """The request with the plan shipped with a demo, which cuts it whatever the search settings are, unless the user names a
+    plan or wants other parts, another orientation or a record of a search."""
+    otherwise = request.plans or request.planes or request.parts is not None or request.orient or request.outputs.record
+    plan = None if otherwise else plan_beside(request.model)
+    return request if plan is None else replace(request, plans=(plan,))
 
 
 def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:
@@ -131,13 +132,19 @@ def check_parts_possible(request: ModelRequest, given: PlanFile | None, profile:
     """Raise ProfileError or SliceError before the search for settings or stops of parts that it cannot make."""
     planes = () if given is None else given.row(request.parts) if request.plan and request.parts else given.parts
     most = len(planes) + 1 if request.plan else max(len(planes) + 1, request.parts or profile.search.most_parts)
-    check_parts_named(profile, most, at_most=True)
+    for settings in profile.parts:
+        if settings.part > most:
+            there = parts_in_words(most, at_most=not request.plan)
+            raise ProfileError(f"{option('part', settings.part)}: there is no part {settings.part}, {there}")
     check_stop_parts(request.stops, most, at_most=True)
 
 
-def check_parts_named(profile: Profile, parts: int, at_most: bool = False) -> None:
-    """Raise ProfileError for settings of parts that do not exist. at_most: `parts` is the most there can be."""
-    for settings in profile.parts:
-        if settings.part > parts:
-            there = parts_in_words(parts, at_most)
-            raise ProfileError(f"{option('part', settings.part)}: there is no part {settings.part}, {there}")
+def with_parts_found(profile: Profile, parts: int) -> tuple[Profile, list[str]]:
+    """The profile without settings of parts that a search has not made, and a warning for each of them: only the search could
+    show that they do not exist, and its result is worth more than a refusal."""
+    absent = [settings.part for settings in profile.parts if settings.part > parts]
+    if not absent:
+        return profile, []
+    there = parts_in_words(parts)
+    warnings = [f"{option('part', part)}: there is no part {part}, {there}; its settings are left out" for part in absent]
+    return with_part_settings(profile.of_all_parts, [own for own in profile.parts if own.part <= parts]), warnings
