@@ -63,7 +63,10 @@ UNITS = (  # ending of a key's name -> unit on a page
     ("_px", "px"),
     ("_bytes", "bytes"),
     *((ending, "%") for ending in ("_share", "_density", "flow", "_overlap", "_bulge", "seam_gap", "_weld_factor", "_saving")),
-    *((ending, "%") for ending in ("fan", "fan_least", "fan_bridge", "fan_infill_bridge", "least_gain", "_gain_preferred")),
+    *(
+        (ending, "%")
+        for ending in ("fan", "fan_least", "fan_bridge", "fan_infill_bridge", "least_gain", "_gain_preferred", "scale")
+    ),
 )
 PERCENT = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)) ?%")
 

@@ -31,8 +31,8 @@ def advice(name: str, value: object, verb: str = "") -> str:
 
 
 def phrase(name: str, terminal: str, value: object = "") -> str:
-    """Words of the terminal in place of which the page has others, which it knows by a name; "": it has none. value: what is in
-    these others."""
+    """Words of the terminal that the page replaces by its own, found by a name; "": it omits them. value: a value in the page's
+    words."""
     return _mark(name, f"{value}", terminal)
 
 

@@ -103,7 +103,7 @@ def modules() -> list[str]:
     return sorted(path.relative_to(ROOT).as_posix() for layer in LAYERS for path in (ROOT / layer).rglob("*.py"))
 
 
-def test_every_package_is_looked_at() -> None:
+def test_every_package_is_checked() -> None:
     assert {path.split("/")[0] for path in modules()} == set(LAYERS)
     assert "machine/pipeline/pictures.py" in modules()
 
@@ -159,12 +159,12 @@ def test_two_rooms_that_import_each_other_are_found() -> None:
         floors(room_graph(graph, rooms_of(graph)))
 
 
-def test_no_file_imports_itself_by_way_of_others_not_even_for_types() -> None:
+def test_no_file_imports_itself_through_others_even_for_types() -> None:
     sources = {module: source for module, source in draw_rooms.modules().items() if not module.endswith("__init__")}
     floors(import_graph(sources))  # raises CycleError with the files of a cycle
 
 
-def test_a_circle_behind_type_checking_is_found() -> None:
+def test_a_cycle_under_type_checking_is_found() -> None:
     late = "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n    from a.one import One"
     with pytest.raises(CycleError):
         floors(import_graph({"a.one": "from a.two import Two", "a.two": late}))

@@ -11,7 +11,7 @@ from tests.shapes import tee
 PAGE = Path(__file__).resolve().parents[1] / "docs" / "library.md"
 
 
-def test_the_example_goes_from_a_mesh_to_a_simulated_print(
+def test_the_example_leads_from_a_mesh_to_a_simulated_print(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (example,) = re.findall(r"```python\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.DOTALL)

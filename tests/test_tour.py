@@ -72,7 +72,7 @@ def test_the_tour_is_read_in_ten_minutes() -> None:
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_what_a_page_names_exists(page: str) -> None:
+def test_every_name_on_a_page_exists(page: str) -> None:
     assert [name for name in named(page) if not exists(name)] == []
 
 
@@ -91,7 +91,7 @@ def test_the_links_of_a_page_lead_to_files_and_headings_that_exist(page: str) ->
         assert not anchor or target.suffix != ".md" or anchor in anchors(target), f"{file}#{anchor}"
 
 
-def test_the_check_tells_what_exists_from_what_does_not() -> None:
+def test_the_check_distinguishes_existing_names_from_others() -> None:
     assert exists("mdp.mesh.Mesh.volume_mm3")
     assert exists("slicer.paths")
     assert exists("machine.link")

@@ -109,7 +109,7 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     began = perf_counter()
     model = read_model(locate(request.model), profile.process.scale, profile.process.rotate_deg, request.plate)
     mesh, read_s = model.mesh, perf_counter() - began
-    for note in model.notes:
+    for note in (*model.notes, *_part_notes(request, profile)):
         say(f"{request.name}: {note}")
     check_modifiers(profile, model.zones.modifiers, f"{request.name}: ")
     compilers.begin((*compilers.JUDGE, *compilers.SEARCH, *(compilers.bundles_to_build(profile) if to_build else ())))
@@ -141,6 +141,16 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
         say(f"{request.name}: {note}")
     plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation, profile.parts)
     return Decomposed(decomposition, as_turned(profile, orientation), plan, read_s, perf_counter() - began)
+
+
+def _part_notes(request: ModelRequest, profile: Profile) -> Iterator[str]:
+    """Notes before a search that may find fewer parts than have settings, because it may take minutes until that is refused."""
+    most = max((own.part for own in profile.parts), default=1)
+    if most > 1 and request.plan is None and request.parts is None:
+        yield (
+            f"{option('part', most)} is refused after the search if that finds fewer parts: {option('plan')} with the plan of an "
+            "earlier search fixes them"
+        )
 
 
 def _price(request: ModelRequest, unused: bool) -> Pricing | None:

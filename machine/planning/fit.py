@@ -189,7 +189,7 @@ def _head_below(machine: Machine, height_mm: float) -> Iterator[tuple[Floats, Fl
 
 
 class Misfit(NamedTuple):
-    """The index of the box without a place; the number already placed; whether all would fit but for the head."""
+    """The first box without a place: its index, how many boxes have one, and whether all would fit without the head."""
 
     number: int
     standing: int

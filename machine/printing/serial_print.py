@@ -80,7 +80,8 @@ class SerialPrinter:
     def fits(self, machine: Machine) -> str:
         """A sentence that the printer fits a machine."""
         if isinstance(self._at, Simulated):
-            speed = f"{self._at.speed:g} times as fast as a real one" if self._at.speed else "as fast as it can"
+            times = "" if self._at.speed == 1.0 else f"{self._at.speed:g} times "
+            speed = f"{times}as fast as a real one" if self._at.speed else "as fast as it can"
             return f"a simulated {machine.name}, {speed}"
         assert self.identity.printer is not None
         described = describe_answer(self.identity.printer, self._at.baud)

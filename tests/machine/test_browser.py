@@ -136,7 +136,7 @@ def test_readouts_are_the_numbers_of_the_dry_run(page: Browser) -> None:
         assert [text(page, f"readout-{name}") for name in names] == expected
 
 
-def test_a_row_that_extrudes_tells_its_type_its_bead_and_its_speed(page: Browser) -> None:
+def test_an_extruding_row_shows_its_type_bead_and_speed(page: Browser) -> None:
     read = program()[1].run.program
     k = int((read.e_mm > 0).nonzero()[0][5])
     put(page, "position", k)
@@ -177,7 +177,7 @@ def test_a_section_takes_beads_away_on_either_side_of_it_and_clicks_go_through(p
     assert page.value(PICTURE) == before
 
 
-def test_every_colouring_has_a_picture_of_its_own(foreign: Browser) -> None:
+def test_every_colouring_gives_another_picture(foreign: Browser) -> None:
     pictures = set()
     for mode in ("part", "kind", "speed", "layer", "flow", "fan"):
         put(foreign, "colour-by", mode)
@@ -229,7 +229,7 @@ def test_other_parts_are_shown_or_hidden(page: Browser) -> None:
     assert 0 < drawn(page) < all_shown == len(program()[1].run.program.line)
 
 
-def test_the_frame_of_the_workpiece_shows_the_same_row_otherwise(page: Browser) -> None:
+def test_the_workpiece_frame_shows_the_same_row_from_another_pose(page: Browser) -> None:
     turned = int((abs(program()[1].run.program.end[:, 3]) > 30).nonzero()[0][10])
     put(page, "position", turned)
     before, read = page.value(PICTURE), text(page, "readout-x")
@@ -250,7 +250,7 @@ def test_residual_faces_are_red_and_may_be_left_plain(browser: Browser, tmp_path
     assert page.value(REDS) > plain + 100
 
 
-def test_parts_are_drawn_apart_and_the_table_stands_as_for_one(browser: Browser, tmp_path: Path) -> None:
+def test_parts_are_drawn_apart_and_the_table_is_posed_as_for_one(browser: Browser, tmp_path: Path) -> None:
     profile, decomposition, _, _ = hand.printed()
     page = opened(browser, tmp_path, parts_page(decomposition, profile))
     together = page.value(PICTURE)
@@ -277,7 +277,7 @@ def test_the_front_is_shown_with_dashes_where_nothing_is_estimated(choices: Brow
     lines = choices.value(
         "[...document.querySelectorAll('#front tbody tr')].map((line) => [...line.cells].map((c) => c.textContent))"
     )
-    assert lines[0] == ["1", "100.0", "0", "30.4", "–", "–"]
+    assert lines[0] == ["1", "100", "0", "30.4", "–", "–"]
     assert lines[1] == ["2✓", "0.0", "40", "0.0", "1h 7m", "1.2"]
     assert text(choices, "front-told") == "✓ chosen for the lowest cost."
 
@@ -310,7 +310,7 @@ def test_the_cuts_of_another_row_take_the_place_of_the_beads(browser: Browser, t
     assert page.value(PICTURE) == whole != before
 
 
-def test_where_there_is_no_choice_no_front_is_shown(page: Browser) -> None:
+def test_no_front_is_shown_without_a_choice(page: Browser) -> None:
     assert page.value("document.getElementById('front-field').hidden")
 
 
@@ -324,7 +324,7 @@ def test_a_finding_is_marked_and_a_click_goes_there(page: Browser) -> None:
     assert finding.message in text(page, "findings")
 
 
-def test_findings_that_lie_together_share_a_marker_that_goes_through_them(browser: Browser, tmp_path: Path) -> None:
+def test_findings_at_one_place_share_a_marker_that_steps_through_them(browser: Browser, tmp_path: Path) -> None:
     profile, printed = program()
     finding = printed.run.findings[0]
     crowd = tuple(replace(finding, message=f"complaint {k}") for k in range(400))
@@ -350,7 +350,7 @@ def test_a_file_without_comments_is_shown_with_what_is_known(foreign: Browser) -
     assert foreign.value("getComputedStyle(document.querySelector('.solids')).display") == "none"
 
 
-def test_playing_goes_on_until_it_is_paused(page: Browser) -> None:
+def test_playing_continues_until_it_is_paused(page: Browser) -> None:
     put(page, "position", 3)
     put(page, "speed", 5)
     page.click("#play")
@@ -412,7 +412,7 @@ def test_a_click_on_a_bead_goes_to_its_row(page: Browser) -> None:
     assert text(page, "readout-type") in ("External perimeter", "Perimeter")
 
 
-def test_dark_and_light_follow_the_system_until_the_person_chooses(page: Browser) -> None:
+def test_dark_and_light_follow_the_system_until_the_user_chooses(page: Browser) -> None:
     page.prefer("dark")
     page.wait("document.documentElement.dataset.theme === 'dark'")
     dark = page.value("getComputedStyle(document.body).backgroundColor")

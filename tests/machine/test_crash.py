@@ -8,7 +8,7 @@ import pytest
 from machine import crash
 
 
-def test_a_bug_on_a_full_disk_is_told_without_its_log(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bug_on_a_full_disk_is_reported_without_its_log(monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_given: object, **_options: object) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 

@@ -186,7 +186,7 @@ def test_an_error_says_what_became_of_the_heaters(loop: Loop, monkeypatch: Monke
     assert bug.__notes__[-1] == "the printer reports its heaters off"
 
 
-def test_a_start_block_that_cannot_be_filled_in_is_told_and_nothing_moves(monkeypatch: MonkeyPatch) -> None:
+def test_a_start_block_that_cannot_be_filled_in_is_refused_and_nothing_moves(monkeypatch: MonkeyPatch) -> None:
     gcode = PROFILE.machine.gcode.model_copy(update={"start": "M104 S{warmth}\nG28"})
     broken = PROFILE.model_copy(update={"machine": PROFILE.machine.model_copy(update={"gcode": gcode})})
     monkeypatch.setattr(f"{__name__}.PROFILE", broken)
@@ -209,7 +209,7 @@ def test_homing_by_hand_heats_nothing_and_does_not_wait(heat: str, monkeypatch: 
     assert printer.record.unknown == 0
 
 
-def test_a_termination_request_lets_go_of_a_printer_in_hand(monkeypatch: MonkeyPatch) -> None:
+def test_a_termination_signal_releases_a_printer_under_manual_control(monkeypatch: MonkeyPatch) -> None:
     class Terminated(Steps):
         def take(self, *ignored: object, **told: object) -> None:
             super().take(**told)
@@ -239,7 +239,7 @@ def test_an_emergency_stop_counts_while_the_heaters_are_switched_off() -> None:
     assert happened(printer.record, "M112")
 
 
-def test_who_leaves_twice_ends_a_session_once() -> None:
+def test_leaving_twice_ends_a_session_once() -> None:
     printer = VirtualPrinter(PROFILE.machine)
     with session_at(printer) as session:
         session.greet()

@@ -28,12 +28,12 @@ def test_an_amount_has_at_most_three_digits() -> None:
     assert [amount(value, 1) for value in (-1e-9, 0.04, 86.94, 344.8, 1784.9)] == ["0.0", "0.0", "86.9", "345", "1780"]
 
 
-def test_without_a_price_nothing_is_told_of_it_not_even_in_the_file() -> None:
+def test_without_a_price_no_cost_is_shown_or_written() -> None:
     assert (price(1.0, load().material), price_in_words(1.0, load().material), price_json(1.0, load().material)) == (None, "", {})
     assert not [line for line in foot(load(), 1.0, 1.0) if "cost = " in line or "price" in line or "currency" in line]
 
 
-def test_a_file_tells_the_cost_in_the_words_that_print_hosts_look_for() -> None:
+def test_a_file_states_the_cost_in_the_words_that_print_hosts_read() -> None:
     lines = list(foot(PRICED, TEN_GRAMS_MM, 1.0))
     assert "; filament cost = 0.25" in lines
     assert "; material.price_per_kg = 25.0" in lines

@@ -69,7 +69,7 @@ def test_number_and_height_of_a_layer_can_be_typed(page: Browser) -> None:
     assert layer(page, "high") == ["1", "2", "0.40"]
 
 
-def test_a_click_beside_the_layers_goes_to_that_layer_whose_time_is_told(page: Browser) -> None:
+def test_a_click_on_a_bar_beside_the_layers_goes_to_that_layer(page: Browser) -> None:
     put(page, "position", 0)
     x, y, high = page.value(
         "(() => { const bars = document.getElementById('layer-times').getBoundingClientRect();"
@@ -149,7 +149,7 @@ def slice_it(browser: Browser) -> None:
     browser.value("$('leave-print').hidden || $('leave-print').click()")
 
 
-def test_parts_appear_are_compared_looked_at_and_marked_when_the_bench_changes(browser: Browser, bench: Running) -> None:
+def test_sliced_parts_appear_are_compared_previewed_and_outdated_when_the_bench_changes(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "tee.stl", stl(tee(6.0, 24.0, 24.0)))
     browser.click("#add")
     browser.wait("$('undo').getAttribute('aria-label') === 'undo: add a plane'")
@@ -244,9 +244,7 @@ def test_a_finding_leads_to_its_place_and_errors_are_saved_only_on_demand(browse
     browser.wait("document.body.classList.contains('stale')")
 
 
-def test_errors_of_the_slices_refuse_a_print_at_once_and_stale_slices_cannot_be_asked_for(
-    browser: Browser, bench: Running
-) -> None:
+def test_a_print_with_slicing_errors_or_stale_slices_is_refused_at_once(browser: Browser, bench: Running) -> None:
     slice_with_errors(browser, bench)
     browser.click("#tab-printing")
     type_in(browser, "port-typed", "/dev/no-such-port")
@@ -289,7 +287,7 @@ def test_errors_of_the_slices_refuse_a_print_at_once_and_stale_slices_cannot_be_
     assert browser.complaints == []
 
 
-def test_copies_and_pauses_are_typed_told_and_taken_away(browser: Browser, bench: Running) -> None:
+def test_copies_and_pauses_are_typed_listed_and_removed(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "box.stl", stl(box(8, 8, 4)))
     browser.click("#tab-slices")
     scene = "box: [[-4, -4, 0], [4, 4, 4]], shifts: [], extras: {}"

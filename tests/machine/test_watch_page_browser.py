@@ -56,7 +56,7 @@ def test_a_print_is_paused_resumed_and_stopped_by_buttons(browser: Browser, tmp_
         assert browser.complaints == []
 
 
-def test_an_emergency_stop_is_asked_once_and_the_print_ends(browser: Browser, tmp_path: Path) -> None:
+def test_an_emergency_stop_is_sent_once_and_the_print_ends(browser: Browser, tmp_path: Path) -> None:
     with printing(tmp_path) as (process, address):
         browser.resize(400, 300)  # a small picture, because the print has many moves
         browser.open(address)

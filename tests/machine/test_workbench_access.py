@@ -47,7 +47,7 @@ def test_contrast_is_that_of_its_definition() -> None:
 
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
-def test_text_stands_out_from_its_ground(theme: str) -> None:
+def test_text_has_enough_contrast(theme: str) -> None:
     colour = colours(theme)
     on_ground = [(text, ground) for text in ("text", "soft", "accent", "error", "warning") for ground in ("panel", "press")]
     of_axes = [(axis, ground) for axis in ("axis-x", "axis-y", "axis-z") for ground in ("panel", "on-axis")]
@@ -57,7 +57,7 @@ def test_text_stands_out_from_its_ground(theme: str) -> None:
 
 @pytest.mark.parametrize("theme", ["light", "dark"])
 @pytest.mark.parametrize("behind", [0, 255])
-def test_text_over_the_picture_stands_out_whatever_is_drawn_behind_it(theme: str, behind: int) -> None:
+def test_text_over_the_picture_has_enough_contrast_on_any_background(theme: str, behind: int) -> None:
     colour = colours(theme)
     (card,) = re.findall(r"--card: #([0-9a-f]{8})", STYLES[0].read_text().split(":root")[1 if theme == "light" else 2])
     *channels, opaque = (int(card[k : k + 2], 16) for k in (0, 2, 4, 6))
@@ -66,7 +66,7 @@ def test_text_over_the_picture_stands_out_whatever_is_drawn_behind_it(theme: str
     assert {text: ratio for text, ratio in faint.items() if ratio < LEAST_OF_TEXT} == {}
 
 
-def test_nothing_but_what_cannot_be_pressed_is_made_faint() -> None:
+def test_only_disabled_controls_are_faint() -> None:
     """Partial opacity lowers the contrast of text: only disabled controls and pictures may use it."""
     faint = re.findall(r"^(.*?) \{[^}]*(?<!-)\bopacity: 0\.\d+[^}]*\}", STYLES[1].read_text(), re.MULTILINE)
     assert {rule for rule in faint if not re.search(r":disabled|#rings|#canvas", rule)} == set()

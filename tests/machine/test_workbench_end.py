@@ -20,7 +20,7 @@ PRINTING = "document.documentElement.dataset.printing"
 
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
-def test_what_the_page_prints_the_command_line_prints_from_its_plan(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_command_line_prints_the_same_from_the_plan_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     kitten = KITTEN.is_file()
     model, given = Path("kitten.off" if kitten else "figure.ply"), (*QUICK, "--set", f"process.scale={0.3 if kitten else 0.6}")

@@ -82,7 +82,7 @@ def test_firefox_draws_the_model_lays_it_down_and_on_a_face(firefox: Firefox) ->
     assert firefox.value("$('overhang').textContent") == standing
 
 
-def test_firefox_finds_parts_and_goes_through_the_front(firefox: Firefox) -> None:
+def test_firefox_finds_parts_and_browses_the_front(firefox: Firefox) -> None:
     find_as_it_lies(firefox)
     assert "recommended" in firefox.value("$('front-told').textContent")
     taken = firefox.value("$('front').value")
@@ -96,7 +96,7 @@ def test_firefox_finds_parts_and_goes_through_the_front(firefox: Firefox) -> Non
     assert firefox.value("document.body.classList.contains('no-cuts')")
 
 
-def test_firefox_drags_tilts_and_locks_a_plane_and_finds_the_others_beside_a_mark(firefox: Firefox) -> None:
+def test_firefox_moves_tilts_and_locks_a_plane_and_finds_the_others_beside_a_mark(firefox: Firefox) -> None:
     firefox.click("[data-view=front]")
     firefox.click("#add")
     firefox.wait("!$('plane').hidden && $('plane-told').textContent")

@@ -5,11 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from mdp.save import stl
 from tests.machine.browser import CHROMIUM, Browser
 from tests.machine.conftest import small_browser
 from tests.machine.prints import commands_sent, prints_line
 from tests.machine.running_workbench import QUICK, Running, workbench
 from tests.machine.test_workbench_page import choose
+from tests.shapes import box
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
 
@@ -26,7 +28,7 @@ def opened(browser: Browser, running: Running, name: str, content: str) -> None:
     browser.wait(f"['ready', 'failed'].includes({VIEW}?.documentElement?.dataset.state) && !$('print-page').hidden")
 
 
-def test_a_dropped_file_is_looked_at_and_printed_as_it_is(tmp_path: Path) -> None:
+def test_a_dropped_file_is_shown_and_printed_unchanged(tmp_path: Path) -> None:
     with workbench(*QUICK) as running, small_browser() as browser, prints_line(running, "watching") as page:
         opened(browser, running, "box.gcode", GOOD)
         assert browser.value(f"{VIEW}.getElementById('title').textContent") == "box.gcode"
@@ -59,6 +61,24 @@ def test_a_dropped_file_with_errors_shows_them_and_is_refused_like_print(tmp_pat
         assert "5000" in browser.value("$('print-problem').textContent")
 
 
+def test_a_model_that_is_opened_closes_the_g_code_file(tmp_path: Path) -> None:
+    (tmp_path / "box.gcode").write_text(GOOD)
+    (tmp_path / "box.stl").write_bytes(stl(box(8, 8, 8)))
+    with workbench(*QUICK) as running, running.line() as page:
+        running.send(tmp_path / "box.gcode")
+        page.until(lambda state: state["gcode"])
+        running.send(tmp_path / "box.stl")
+        page.until(lambda state: state["model"] and state["gcode"] is None)
+
+
+def test_a_file_of_another_kind_is_refused_with_the_kinds_that_can_be_opened(tmp_path: Path) -> None:
+    (tmp_path / "photo.jpg").write_bytes(b"JFIF")
+    with workbench(*QUICK) as running:
+        status, text = running.send(tmp_path / "photo.jpg")
+        assert status == 422
+        assert all(kind in text for kind in (b"photo.jpg: models (.stl", b"G-code (", b".gcode", b"plans and profiles (.toml)"))
+
+
 def test_a_file_without_moves_is_refused_with_its_name(tmp_path: Path) -> None:
     (tmp_path / "empty.gcode").write_text("M104 S0\n")
     with workbench(*QUICK) as running:
@@ -66,7 +86,7 @@ def test_a_file_without_moves_is_refused_with_its_name(tmp_path: Path) -> None:
         assert (status, b"empty.gcode holds no move: there is nothing to show" in text) == (422, True)
 
 
-def test_a_file_that_does_not_tell_its_machine_is_tried_for_that_of_the_settings(tmp_path: Path) -> None:
+def test_a_file_without_a_machine_is_dry_run_for_that_of_the_settings(tmp_path: Path) -> None:
     (tmp_path / "box.gcode").write_text(GOOD)
     with workbench(*QUICK) as running, running.line() as page:
         running.send(tmp_path / "box.gcode")

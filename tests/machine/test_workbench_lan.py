@@ -129,7 +129,7 @@ def test_a_paired_device_commands_the_bench_until_it_is_let_go(bench: OpenToNetw
     assert device.ask("/paired/1/").status == 403
 
 
-def test_a_hundred_codes_by_parallel_lines_pair_nobody_and_the_others_go_on() -> None:
+def test_a_hundred_parallel_codes_pair_no_device_and_leave_the_others_connected() -> None:
     with open_workbench(*QUICK) as bench:
         paired = Device(bench)
         assert paired.pair(bench.code()) == 303
@@ -170,7 +170,7 @@ def test_a_device_stops_the_print_of_another_page_and_the_print_outlives_its_dev
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificate")
-def test_with_a_certificate_the_network_has_https_and_this_computer_what_it_had(tmp_path: Path) -> None:
+def test_with_a_certificate_the_network_uses_https_and_this_computer_http(tmp_path: Path) -> None:
     own = [str(tmp_path / name) for name in ("own.pem", "own.key")]
     new = ["openssl", "req", "-x509", "-newkey", "ec", "-pkeyopt", "ec_paramgen_curve:prime256v1", "-nodes"]
     subprocess.run([*new, "-out", own[0], "-keyout", own[1], "-subj", "/CN=workshop"], check=True, capture_output=True)

@@ -52,7 +52,7 @@ def control(browser: Browser, key: str) -> None:
     browser.value(f"document.body.dispatchEvent(new KeyboardEvent('keydown', {{ key: '{key}', ctrlKey: true, bubbles: true }}))")
 
 
-def test_where_nothing_lies_a_card_opens_a_demo_by_its_picture(browser: Browser, bench: Running) -> None:
+def test_the_start_card_opens_a_demo_by_its_picture(browser: Browser, bench: Running) -> None:
     browser.open(bench.address)
     browser.wait(f"document.documentElement.dataset.version && {IDLE}")
     assert browser.value("$('drop').checkVisibility()")
@@ -149,7 +149,7 @@ def test_a_part_has_a_card_that_the_keyboard_chooses_and_locks(browser: Browser,
     browser.wait("$('parts-list').textContent.includes('breaks at about')")
     card = browser.value("$('parts-list').children[1].innerText").split("\n")
     assert card[:2] == ["Part 2", "straight up"]
-    assert card[2:8] == ["volume", "5.00 cm³", "support", "300.0 mm²", "seam", "40 mm"]
+    assert card[2:8] == ["volume", "5.00 cm³", "support", "300 mm²", "seam", "40 mm"]
     browser.value("document.querySelector('#parts-list [value=\"2\"]').focus()")
     browser.value("document.querySelector('#parts-list [value=\"1\"]').click()")  # as an arrow key does
     assert browser.value("document.activeElement.value") == "1"
@@ -165,7 +165,7 @@ def test_a_part_has_a_card_that_the_keyboard_chooses_and_locks(browser: Browser,
 
 
 @pytest.mark.parametrize("size", [SMALL, (720, 900), (390, 844)])
-def test_the_tools_stand_in_the_picture_hide_no_knob_and_say_why_a_plane_is_refused(
+def test_the_plane_tools_are_in_the_picture_hide_no_handle_and_say_why_a_plane_is_refused(
     browser: Browser, bench: Running, size: tuple[int, int]
 ) -> None:
     browser.resize(*size)
@@ -183,7 +183,17 @@ def test_the_tools_stand_in_the_picture_hide_no_knob_and_say_why_a_plane_is_refu
     browser.resize(*SMALL)
 
 
-def test_the_list_of_steps_goes_back_and_forth_by_several(browser: Browser, bench: Running) -> None:
+def test_a_refusal_ends_when_another_part_is_chosen(browser: Browser, bench: Running) -> None:
+    with_plane(browser, bench)
+    drag_slider(browser, "plane-offset", 39.95, "change")
+    browser.wait("$('plane-told').classList.contains('refused')")
+    browser.click("#parts-list [value='1']")
+    browser.wait("!modules['page/store'].store.state.refused && $('problem').hidden")
+    browser.click("#parts-list [value='2']")
+    assert not browser.value("$('plane-told').classList.contains('refused') || $('put-near').checkVisibility()")
+
+
+def test_the_list_of_steps_undoes_and_redoes_several_at_once(browser: Browser, bench: Running) -> None:
     with_plane(browser, bench)
     drag_slider(browser, "plane-offset", 22, "change")
     browser.wait(f"{UNDO} === 'undo: move a plane'")

@@ -103,7 +103,7 @@ def test_arrow_keys_turn_a_ring_and_shift_takes_15_degrees_at_once(browser: Brow
     browser.wait("$('size-z').value === '10.00' && $('size-y').value === '40.00'")  # a T of 40 x 10 x 40 mm, lying on its back
 
 
-def test_a_typed_side_scales_the_model_and_one_that_the_machine_does_not_reach_is_told(browser: Browser, bench: Running) -> None:
+def test_a_typed_side_scales_the_model_and_an_unreachable_size_is_reported(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "sized.stl", stl(tee()))
     browser.click("#tab-parts")
     browser.click("#add")
@@ -122,7 +122,7 @@ def test_a_typed_side_scales_the_model_and_one_that_the_machine_does_not_reach_i
     assert browser.complaints == []
 
 
-def test_parts_drawn_apart_tell_their_support_and_are_chosen_by_a_click(browser: Browser, bench: Running) -> None:
+def test_exploded_parts_show_their_support_and_are_selected_by_a_click(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "apart.stl", stl(tee()))
     find_as_it_lies(browser)
     browser.wait("document.documentElement.dataset.pieces === '2'")
@@ -155,7 +155,7 @@ def test_parts_drawn_apart_tell_their_support_and_are_chosen_by_a_click(browser:
     assert browser.value("$('parts-list').children.length") == 1
 
 
-def test_another_bench_has_a_page_of_its_own_and_is_closed_in_the_list(browser: Browser, bench: Running) -> None:
+def test_another_bench_has_its_own_page_and_is_closed_in_the_list(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "here.stl", stl(tee()))
     browser.click("#tab-model")
     browser.click("#another")

@@ -48,7 +48,7 @@ def waits_for_place(browser: Browser, x: int, y: int) -> None:
     browser.wait(f"JSON.stringify({PLACE}.map(Number)) === '[{x},{y}]' && {STOOD} === '[{x},{y}]'")
 
 
-def test_keys_and_numbers_move_the_model_its_plane_goes_along_and_undo_takes_one_step(browser: Browser, bench: Running) -> None:
+def test_keys_and_numbers_move_the_model_with_its_plane_in_one_step(browser: Browser, bench: Running) -> None:
     open_in_the_middle(browser, bench, "placed.stl")
     browser.click("#tab-parts")
     browser.click("#add")
@@ -73,7 +73,7 @@ def test_keys_and_numbers_move_the_model_its_plane_goes_along_and_undo_takes_one
     assert browser.complaints == []
 
 
-def test_a_drag_of_the_knob_moves_the_model_by_whole_mm_under_the_hand(browser: Browser, bench: Running) -> None:
+def test_a_drag_of_the_handle_moves_the_model_by_whole_mm(browser: Browser, bench: Running) -> None:
     open_in_the_middle(browser, bench, "dragged-away.stl")
     browser.click("[data-view=top]")
     browser.click("#fit")
@@ -88,9 +88,7 @@ def test_a_drag_of_the_knob_moves_the_model_by_whole_mm_under_the_hand(browser: 
     assert x >= 4.0
 
 
-def test_copies_stand_in_the_picture_where_they_are_printed_and_more_than_there_is_room_for_are_told(
-    browser: Browser, bench: Running
-) -> None:
+def test_copies_are_drawn_where_they_are_printed_and_too_many_are_reported(browser: Browser, bench: Running) -> None:
     open_in_the_middle(browser, bench, "many.stl")
     browser.click("#tab-slices")
     drag_slider(browser, "copies", 6, "change")

@@ -50,7 +50,7 @@ def looked_at(browser: Browser, bench: Running, name: str) -> None:
     browser.click("#tab-parts")
 
 
-def test_a_plane_snaps_to_the_neck_nearby_and_where_there_is_none_that_is_told(bench: Running, folder: Path) -> None:
+def test_a_plane_snaps_to_the_narrowest_section_nearby_or_reports_that_there_is_none(bench: Running, folder: Path) -> None:
     with bench.line() as page:
         opened(page, bench, "glass.stl")
         added(page, 35.0)
@@ -185,7 +185,7 @@ def test_a_stroke_that_makes_no_sense_is_one_sentence(bench: Running, folder: Pa
         assert said in page.until(lambda state: state["problem"])["problem"]
 
 
-def test_an_order_that_cannot_be_is_refused_with_what_comes_in_the_way(bench: Running, folder: Path) -> None:
+def test_an_impossible_print_order_is_refused_with_the_obstacle(bench: Running, folder: Path) -> None:
     with bench.line() as page:
         opened(page, bench, "tee.stl")
         added(page, 20.0, 35.0)
@@ -197,7 +197,7 @@ def test_an_order_that_cannot_be_is_refused_with_what_comes_in_the_way(bench: Ru
         assert [cut["offset_mm"] for cut in page.state["cuts"]] == [20.0, 35.0]
 
 
-def test_a_page_that_goes_with_a_plane_in_its_hand_leaves_the_plan_as_it_was(bench: Running, folder: Path) -> None:
+def test_a_page_closed_during_a_drag_leaves_the_plan_unchanged(bench: Running, folder: Path) -> None:
     with bench.line() as page:
         opened(page, bench, "tee.stl")
         added(page, 35.0)
@@ -212,7 +212,9 @@ def test_a_page_that_goes_with_a_plane_in_its_hand_leaves_the_plan_as_it_was(ben
         assert page.until(lambda state: state["undo"] == "move a plane")["cuts"][0]["offset_mm"] == 36.0
 
 
-def test_the_head_is_drawn_where_it_would_touch_and_goes_with_the_plane(browser: Browser, bench: Running, folder: Path) -> None:
+def test_the_head_is_drawn_where_it_would_collide_and_disappears_with_the_plane(
+    browser: Browser, bench: Running, folder: Path
+) -> None:
     with bench.line() as page:
         opened(page, bench, "tee.stl")
         page.do("add", normal=[0, 0, 1], offset_mm=10.0)
@@ -275,7 +277,7 @@ def test_a_plan_s_modifiers_are_listed_and_drawn(browser: Browser, bench: Runnin
         bench.send(Path("modified.toml"))
         page.until(lambda state: state["modifiers"])
         browser.wait("document.querySelectorAll('#marks tr').length === 1")
-        assert browser.value("$('marks').textContent") == "modifierInfill density = 1.0"
+        assert browser.value("$('marks').textContent") == "modifierInfill density = 100 %"
         browser.wait("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
         assert (pixels(browser) != bare).any(axis=2).mean() > 0.005
 
@@ -328,7 +330,7 @@ def test_faces_and_boxes_are_marked_by_clicks_moved_and_taken_away(browser: Brow
         assert browser.complaints == []
 
 
-def test_the_others_are_found_beside_a_locked_plane_and_keep_out_of_what_is_marked(
+def test_other_planes_are_found_beside_a_locked_one_and_avoid_protected_areas(
     browser: Browser, bench: Running, folder: Path
 ) -> None:
     with bench.line() as page:
@@ -349,7 +351,7 @@ def test_the_others_are_found_beside_a_locked_plane_and_keep_out_of_what_is_mark
             assert not min(heights) < -1e-6 < 1e-6 < max(heights)
 
 
-def test_a_plane_in_a_protected_area_stays_with_its_reason_on_its_card_and_tools_and_beside_the_slice_button(
+def test_a_plane_in_a_protected_area_stays_with_its_reason_on_card_tools_and_slice_button(
     browser: Browser, bench: Running, folder: Path
 ) -> None:
     with bench.line() as page:
@@ -370,7 +372,7 @@ def test_a_plane_in_a_protected_area_stays_with_its_reason_on_its_card_and_tools
         assert browser.complaints == []
 
 
-def test_the_knobs_of_a_plane_have_words_and_colours_of_their_own(browser: Browser, bench: Running, folder: Path) -> None:
+def test_the_handles_of_a_plane_have_labels_and_colours(browser: Browser, bench: Running, folder: Path) -> None:
     with bench.line() as page:
         opened(page, bench, "tee.stl")
         added(page, 20.0)
@@ -400,7 +402,7 @@ def test_the_chosen_plane_is_seen_through_a_thick_model_and_about_it(browser: Br
         assert arms.sum() > veiled.sum() > 100
 
 
-def test_a_number_below_the_slider_is_taken_by_a_click_and_its_costs_are_told_beside_those_of_one_part(
+def test_a_click_on_a_number_below_the_slider_chooses_it_and_compares_its_costs_with_one_part(
     browser: Browser, bench: Running, folder: Path
 ) -> None:
     with bench.line() as page:
@@ -478,7 +480,7 @@ def test_a_message_about_a_project_s_plane_names_the_project_alone(
 
 
 @pytest.mark.parametrize("file", ["", "project.3mf"])  # opened from earlier work, or from a project
-def test_found_rows_stay_as_they_were_when_work_with_a_plane_moved_by_hand_is_opened_again(
+def test_rows_of_the_front_are_unchanged_when_work_with_a_moved_plane_is_opened_again(
     bench: Running, folder: Path, file: str
 ) -> None:
     with bench.line() as page:

@@ -50,15 +50,21 @@ def test_a_model_is_added_drawn_counted_taken_off_the_plate_and_there_after_a_re
     assert browser.complaints == []
 
 
+def test_a_demo_is_added_to_the_plate_beside_the_open_model(browser: Browser, bench: Running) -> None:
+    open_model(browser, bench, "open.stl", stl(tee()))
+    browser.value("{ $('add-demo').value = 'demo:lattice'; $('add-demo').dispatchEvent(new Event('change')); }")
+    waits_for_rows(browser, '[["open.stl","1"],["demo:lattice","1"]]', "All 2 stand on the plate.")
+    assert browser.value("[$('title').textContent, $('add-demo').value]") == ["open.stl", ""]
+    assert browser.complaints == []
+
+
 def red_share(browser: Browser) -> float:
     """The share of the picture in the red of models without a place."""
     red, green, blue = (pixels(browser)[:, :, channel].astype(int) for channel in range(3))
     return float(((red > 130) & (green < 70) & (blue < 70)).mean())
 
 
-def test_models_without_a_place_are_drawn_in_red_beside_the_plate_and_nothing_can_be_sliced(
-    browser: Browser, bench: Running
-) -> None:
+def test_models_without_a_place_are_red_beside_the_plate_and_cannot_be_sliced(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "crowd.stl", stl(box(60, 60, 20)))
     browser.click("#tab-slices")
     assert red_share(browser) == 0.0

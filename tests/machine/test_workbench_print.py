@@ -72,7 +72,7 @@ def sliced(folder: Path, key: None) -> Iterator[Running]:
     ("", "no printer is chosen: choose a port, or sim for the simulated one"),
     ("octoprint:me:secret@host", "server address: it must not hold a name or password: keys have a file of their own"),
 ])  # fmt: skip
-def test_what_is_no_port_of_a_printer_is_told(sliced: Running, port: str, sentence: str) -> None:
+def test_an_invalid_port_is_reported(sliced: Running, port: str, sentence: str) -> None:
     with prints_line(sliced, "first") as page:
         page.do("check", port=port)
         assert page.refused().startswith(sentence)
@@ -82,7 +82,7 @@ def test_what_is_no_port_of_a_printer_is_told(sliced: Running, port: str, senten
     (" ", "no journal is chosen: choose the print to resume, or name the journal's file"),
     ("a\0b", r"'a\x00b' is not a file name: it has a character that no name may have"),
 ])  # fmt: skip
-def test_what_is_no_journal_is_told(sliced: Running, journal: str, sentence: str) -> None:
+def test_an_invalid_journal_is_reported(sliced: Running, journal: str, sentence: str) -> None:
     with prints_line(sliced, "first") as page:
         page.do("go_on", journal=journal, port="/dev/none")
         assert page.refused() == sentence
@@ -308,9 +308,7 @@ def homed(printer: SimulatedPrinter) -> list[str]:
     return [event for _, event in printer.record.events if event.startswith("homed")]
 
 
-def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_question_is_answered(
-    sliced: Running, browser: Browser
-) -> None:
+def test_a_print_ended_by_a_power_cut_is_resumed_from_the_page(sliced: Running, browser: Browser) -> None:
     cut = Fault("reset", at=265, unit="line")  # not in a lifted travel, after which its height would be uncertain
     with SimulatedPrinter(load().machine, faults=[cut]) as printer, prints_line(sliced, "first") as page:
         page.do("check", port=printer.path)
@@ -352,7 +350,7 @@ def test_a_print_that_a_power_cut_has_ended_goes_on_from_the_page_when_its_quest
     assert browser.complaints == []
 
 
-def test_a_printer_is_heated_homed_and_moved_by_hand_from_the_page_and_let_go_of(sliced: Running, browser: Browser) -> None:
+def test_a_printer_is_heated_homed_moved_and_released_from_the_page(sliced: Running, browser: Browser) -> None:
     with SimulatedPrinter(load().machine) as printer:
         browser.open(sliced.address)
         browser.click("#tab-printing")

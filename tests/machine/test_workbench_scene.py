@@ -71,7 +71,7 @@ def test_strokes_of_the_brush_paint_and_erase_and_each_is_one_step(browser: Brow
     assert browser.complaints == []
 
 
-def test_beside_the_model_a_brush_turns_the_view_and_a_second_finger_drops_its_stroke(browser: Browser, bench: Running) -> None:
+def test_a_brush_beside_the_model_turns_the_view_and_a_second_finger_drops_its_stroke(browser: Browser, bench: Running) -> None:
     opened(browser, bench, "touched.stl", stl(ball(20.0)))
     browser.click("#tab-parts")
     browser.click("#mark-brush")
@@ -142,7 +142,7 @@ def test_fit_keeps_the_direction_and_a_double_click_centres_on_the_point(browser
 
 
 @pytest.mark.parametrize(("axis", "view"), [("z", "corner"), ("z", "top"), ("x", "side"), ("y", "front")])
-def test_a_ring_turns_the_model_the_way_of_the_hand(browser: Browser, bench: Running, axis: str, view: str) -> None:
+def test_a_ring_turns_the_model_with_the_pointer(browser: Browser, bench: Running, axis: str, view: str) -> None:
     opened(browser, bench, f"{axis}-{view}.stl", stl(box(20.0, 30.0, 40.0)))
     browser.click("#tab-model")
     browser.click(f"[data-view={view}]")
@@ -169,9 +169,7 @@ def test_a_ring_turns_the_model_the_way_of_the_hand(browser: Browser, bench: Run
     browser.wait(f"{STORE}.state.rotation[0][0] === 1 && {IDLE}")
 
 
-def test_parts_have_their_colours_on_every_tab_beside_the_legend_even_where_one_is_a_single_limb(
-    browser: Browser, bench: Running
-) -> None:
+def test_parts_have_the_colours_of_the_legend_on_every_tab_also_single_limbs(browser: Browser, bench: Running) -> None:
     posts = [m3.Manifold.cube((8.0, 8.0, 40.0)).translate((x, 0.0, 0.0)) for x in (0.0, 32.0)]
     open_model(browser, bench, "two_posts.stl", stl(standing(m3.Manifold.cube((40.0, 8.0, 6.0)) + posts[0] + posts[1])))
     with bench.line() as page:

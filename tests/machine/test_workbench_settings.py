@@ -33,7 +33,7 @@ def choose_part(browser: Browser, part: int) -> None:
     browser.value(f"{{ $('settings-part').value = {part}; $('settings-part').dispatchEvent(new Event('change')); }}")
 
 
-def test_settings_of_the_machine_and_of_one_part_are_set_told_and_taken_back(browser: Browser, bench: Running) -> None:
+def test_settings_of_the_machine_and_of_one_part_are_set_shown_and_reset(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "settings.stl", stl(tee()))
     browser.click("#tab-settings")
     browser.click("#level-all")
@@ -86,9 +86,7 @@ def test_a_percentage_is_typed_as_everyone_does_and_a_comma_is_a_decimal_point(b
     browser.wait("!$('command-line').textContent.includes('infill_density')")
 
 
-def test_settings_are_found_by_other_slicers_words_and_taken_back_by_the_profile_they_belong_to(
-    browser: Browser, bench: Running
-) -> None:
+def test_settings_are_found_by_words_of_other_slicers_and_reset_by_profile(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "words.stl", stl(tee()))
     browser.click("#tab-settings")
     browser.click("#level-simple")
@@ -132,7 +130,7 @@ def test_settings_are_found_by_other_slicers_words_and_taken_back_by_the_profile
     assert browser.complaints == []
 
 
-def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_command_line_writes(
+def test_a_block_and_a_list_are_saved_as_the_profile_file_of_the_command_line(
     browser: Browser, bench: Running, tmp_path: Path
 ) -> None:
     open_model(browser, bench, "block.stl", stl(tee()))
@@ -151,7 +149,7 @@ def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_comm
     browser.value(f"{{ {field}.focus(); {field}.value = 'M300'; {field}.dispatchEvent(new Event('input')); }}")
     with bench.line() as second_page:  # its changes do not reach a field in which the user types
         second_page.do("set", key="machine.gcode.after_part", value="M18")
-        second_page.until(lambda state: state["undo"] == "set machine.gcode.after_part")
+        second_page.until(lambda state: state["undo"] == "set G-code blocks: G-code after a part")
     browser.wait("$('command-line').textContent.includes('M18')")
     assert browser.value(f"{field}.value") == "M300"
     browser.value(f"{field}.dispatchEvent(new Event('blur'))")
@@ -175,15 +173,13 @@ def test_a_block_and_a_list_are_typed_and_kept_as_the_profile_file_that_the_comm
     assert browser.value("$('profiles-list').querySelector('select').value") == "mine.toml"
     assert browser.value("$('undo').getAttribute('aria-label')") == "undo: take mine.toml"
     browser.click("#undo")
-    browser.wait("$('undo').getAttribute('aria-label') === 'undo: set machine.head.silhouette_mm'")
+    browser.wait("$('undo').getAttribute('aria-label') === 'undo: set Print head: Silhouette of the hot end'")
     browser.click("#undo")
     browser.wait(f"!{changed('machine.head.silhouette_mm')} && {changed('machine.gcode.before_part')}")
     assert browser.complaints == []
 
 
-def test_a_front_stays_with_what_no_search_reads_its_times_are_worked_out_anew_and_it_goes_with_the_angle(
-    browser: Browser, bench: Running
-) -> None:
+def test_a_front_keeps_its_rows_or_prices_or_is_dropped_by_the_effect_of_a_setting(browser: Browser, bench: Running) -> None:
     open_model(browser, bench, "front.stl", stl(tee()))
     find_as_it_lies(browser)
     row = "[...$('front-told').querySelectorAll('dd')].map((cell) => cell.textContent)"

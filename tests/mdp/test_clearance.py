@@ -67,7 +67,7 @@ def test_a_low_clip_far_out_leaves_both_poses_and_one_beside_the_part_is_named()
     assert reason == "the head's hot end would meet the plate's clip"
 
 
-def test_the_post_beside_the_part_would_be_met_at_every_pose() -> None:
+def test_a_post_beside_the_part_would_collide_in_every_pose() -> None:
     beside = with_post(MACHINE, 10.0, 200.0)
     free = allowed_poses(MACHINE.model_copy(update={"cradle": []}), LEANING, PART)
     assert [meet(beside, pose) for pose in free] == [True, True]
@@ -80,7 +80,7 @@ def test_a_low_post_far_out_leaves_both_poses_and_a_tall_one_beside_the_part_non
     assert (free, len(allowed_poses(beside, LEANING, PART))) == (2, count)
 
 
-def test_what_lies_under_the_table_changes_nothing() -> None:
+def test_bodies_under_the_table_change_nothing() -> None:
     under = MACHINE.model_copy(update={"cradle": [TableBox(name="arm", min_mm=(-10, 60, -40), max_mm=(10, 80, -1))]})
     assert allowed_poses(under, LEANING, PART) == allowed_poses(MACHINE, LEANING, PART)
     assert np.isfinite([pose.turn_deg for pose in allowed_poses(under, LEANING, PART)]).all()

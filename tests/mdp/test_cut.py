@@ -35,7 +35,7 @@ def test_a_plane_beside_the_solid_leaves_one_half_empty() -> None:
 
 
 @pytest.mark.parametrize("offset_mm", [8.0, 6.3, 11.71])
-def test_what_a_cut_leaves_risky_is_what_is_risky_on_the_part(offset_mm: float) -> None:
+def test_overhangs_after_a_cut_are_those_of_the_part(offset_mm: float) -> None:
     problem = Problem(
         shapes.tee(), load(settings=("process.self_supporting_angle_deg=20", "search.clearance=false", "search.objective=risky"))
     )

@@ -48,7 +48,7 @@ def test_a_demo_is_one_closed_solid_that_needs_no_repair(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_demo_stands_on_a_flat_base_about_the_turn_axis(name: str) -> None:
+def test_a_demo_has_a_flat_base_around_the_turn_axis(name: str) -> None:
     mesh = demo(name)
     base = (mesh.normals[:, 2] < -0.9999) & (mesh.vertices[mesh.faces][:, :, 2] == 0.0).all(axis=1)
     assert mesh.areas_mm2[base].sum() > 400.0
@@ -63,7 +63,7 @@ def test_a_demo_fits_on_a_table_of_100_mm_radius(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_the_risky_faces_of_a_demo_lie_high_above_the_platform(name: str) -> None:
+def test_the_overhangs_of_a_demo_are_high_above_the_build_plate(name: str) -> None:
     mesh = demo(name)
     risky = risky_upright(mesh, 45.0)
     low = mesh.vertices[mesh.faces][:, :, 2].min(axis=1) < 12.0

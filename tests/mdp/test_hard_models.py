@@ -43,13 +43,13 @@ def test_a_lattice_of_thousands_of_handles_is_cut_into_parts_that_hang_together(
 
 
 @pytest.mark.parametrize("mesh", [shapes.standing(m3.Manifold.cylinder(20, 0, 10, 48)), shapes.octahedron(15.0)])
-def test_a_steep_model_on_its_point_needs_no_support_and_says_so(mesh: Mesh) -> None:
+def test_a_steep_model_on_its_tip_needs_no_support_and_says_so(mesh: Mesh) -> None:
     decomposition = _decomposed(mesh, "clearance=false")
     assert len(decomposition.parts) == 1
     assert decomposition.notes == ("no face needs support: the model is printed as one part",)
 
 
-def test_a_ball_on_its_point_is_cut_and_every_part_stands_on_the_ones_before() -> None:
+def test_a_ball_on_a_point_is_cut_and_every_part_is_on_earlier_ones() -> None:
     decomposition = _decomposed(shapes.ball(), "clearance=false")
     assert len(decomposition.parts) == 3
     assert decomposition.reduction > 0.3
@@ -57,7 +57,7 @@ def test_a_ball_on_its_point_is_cut_and_every_part_stands_on_the_ones_before() -
 
 
 @pytest.mark.parametrize("least_mm2", [0, 4])
-def test_no_part_stands_on_air_where_a_piece_of_the_model_floats(least_mm2: int) -> None:
+def test_no_part_floats_if_a_piece_of_the_model_does(least_mm2: int) -> None:
     bits = m3.Manifold.cube((10, 10, 10), True).translate((25, 0, 30))
     mesh = mesh_of(m3.Manifold.cube((10, 10, 10), True).translate((0, 0, 5)) + bits)
     decomposition = _decomposed(mesh, "clearance=false", f"least_interface_mm2={least_mm2}")

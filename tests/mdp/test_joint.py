@@ -84,7 +84,7 @@ def test_a_tower_in_three_parts_hangs_on_its_lowest_joint() -> None:
     assert weakest_of((low, high)) is low
 
 
-def test_what_stands_on_two_legs_hangs_on_neither_and_only_where_it_stands_counts() -> None:
+def test_a_part_on_two_legs_has_the_contact_area_of_both() -> None:
     """The roof stands on both legs, so each leg alone holds only itself."""
     legs = m3.Manifold.cube((4.0, 4.0, 24.0)) + m3.Manifold.cube((4.0, 4.0, 24.0)).translate((30.0, 0.0, 0.0))
     table = legs + m3.Manifold.cube((34.0, 4.0, 10.0)).translate((0.0, 0.0, 24.0)) + m3.Manifold.cube((34.0, 4.0, 2.0))
@@ -93,7 +93,7 @@ def test_what_stands_on_two_legs_hangs_on_neither_and_only_where_it_stands_count
     assert (leg.area_mm2, roof.area_mm2) == (pytest.approx(32.0), pytest.approx(32.0))
 
 
-def test_of_two_pieces_the_weaker_counts_and_both_areas() -> None:
+def test_two_contact_pieces_have_the_weaker_strength_and_both_areas() -> None:
     posts = m3.Manifold.cube((40.0, 8.0, 5.0)) + m3.Manifold.cube((8.0, 8.0, 30.0))
     (joint,) = joints(posts + m3.Manifold.cube((3.0, 3.0, 30.0)).translate((30.0, 0.0, 0.0)), (UP, 10.0))
     assert joint.area_mm2 == pytest.approx(64.0 + 9.0)
@@ -113,7 +113,7 @@ def sound(solid: Solid, *planes: tuple[Sequence[float], float], **search: float)
     return not flaw_of(mesh, cut(mesh, *planes), own)
 
 
-def test_parts_are_sound_while_their_weakest_joint_bears_the_nozzle_with_the_safety_asked_for() -> None:
+def test_parts_are_sound_if_their_weakest_joint_bears_the_nozzle_with_the_safety_factor() -> None:
     post, plane = m3.Manifold.cube((4.0, 6.0, 40.0), True), (UP, -10.0)
     (joint,) = joints(post, plane)
     for push_n, safety, holds in ((0.99, 1.0, True), (1.01, 1.0, False), (0.5, 1.9, True), (0.5, 2.1, False)):
@@ -135,13 +135,13 @@ def test_the_papers_terms_know_no_unsound_parts() -> None:
     assert sound(m3.Manifold.cube((40.0, 40.0, 40.0), True), (UP, 0.0), seam_mm=0.0)
 
 
-def test_the_first_part_is_a_share_of_what_a_person_has_left_of_the_model() -> None:
+def test_the_share_of_the_first_part_refers_to_the_model_without_cuts_by_hand() -> None:
     mesh = mesh_of(m3.Manifold.cube((10.0, 10.0, 100.0)))
     parts = cut(mesh, (UP, 20.0), (UP, 5.0))  # 5 of 20 mm, and of 100 mm in all
     assert [not flaw_of(mesh, parts, PROFILE, by_hand) for by_hand in (0, 1)] == [False, True]
 
 
-def test_a_cut_that_a_person_asked_for_is_not_tested_but_those_beside_it_are() -> None:
+def test_a_cut_by_hand_is_not_tested_but_other_cuts_are() -> None:
     mesh = mesh_of(m3.Manifold.cube((40.0, 40.0, 40.0), True))
     parts = cut(mesh, (UP, 10.0), (UP, -10.0))
     assert [not flaw_of(mesh, parts, PROFILE, by_hand) for by_hand in (0, 1, 2)] == [False, False, True]

@@ -35,13 +35,11 @@ def _clear(gap: float, height: float) -> bool:
         (40.0, 90.0, True),
     ],
 )
-def test_what_may_stand_beside_a_limb_is_what_the_head_leaves_free_at_that_distance(
-    gap: float, height: float, clear: bool
-) -> None:
+def test_bodies_beside_a_limb_are_limited_by_the_head_at_their_distance(gap: float, height: float, clear: bool) -> None:
     assert _clear(gap, height) is clear
 
 
-def test_a_limb_whose_every_layer_lies_higher_than_what_stands_is_clear_however_near_it_is() -> None:
+def test_a_limb_entirely_above_its_neighbours_is_clear_at_any_distance() -> None:
     up = np.array([0.0, 0.0, 5.0])
     assert passes_clear(MACHINE, level(MACHINE), (_box(0.0, 10.0, 10.0) + up, _box(10.5, 8.0, 4.9)), 0.0)
     assert not passes_clear(MACHINE, level(MACHINE), (_box(0.0, 10.0, 10.0) + up, _box(10.5, 8.0, 5.5)), 0.0)
@@ -56,12 +54,12 @@ def _wide_box(x: float, height: float) -> Floats:
 @pytest.mark.parametrize(
     ("gap", "height", "clear"), [(70.0, 38.0, True), (25.0, 30.0, True), (16.5, 40.0, False), (3.0, 2.5, False)]
 )
-def test_large_limbs_are_compared_with_large_things_that_stand(gap: float, height: float, clear: bool) -> None:
+def test_large_limbs_are_compared_with_large_neighbours(gap: float, height: float, clear: bool) -> None:
     assert passes_clear(MACHINE, level(MACHINE), (_wide_box(0.0, 20.0), _wide_box(70.0 + gap, height)), 0.0) is clear
 
 
 @given(st.floats(0.0, 40.0), st.floats(0.0, 40.0), st.floats(0.5, 60.0), st.lists(st.floats(-60.0, 60.0), min_size=2, max_size=2))
-def test_the_tip_asked_for_is_the_height_that_the_underside_leaves(x: float, y: float, top: float, place: list[float]) -> None:
+def test_the_required_tip_height_is_that_left_by_the_underside(x: float, y: float, top: float, place: list[float]) -> None:
     standing = StandingColumns.of(np.array([[x, y, top]]), 0.0, MACHINE)
     across, along = x - place[0], y - place[1]
     radius = max(np.hypot(across, along) - 1.0, 0.0)

@@ -9,7 +9,7 @@ from profiles.errors import MeshError
 from tests.shapes import tee
 
 
-def test_a_mesh_goes_to_trimesh_and_back_as_it_is() -> None:
+def test_a_mesh_is_unchanged_by_conversion_to_trimesh_and_back() -> None:
     there = tee().to_trimesh()
     back = Mesh.from_trimesh(there)
     assert there.volume == pytest.approx(tee().volume_mm3)
@@ -17,6 +17,6 @@ def test_a_mesh_goes_to_trimesh_and_back_as_it_is() -> None:
 
 
 @pytest.mark.parametrize("faces", [tee().faces[1:], tee().faces[:, ::-1]])
-def test_what_is_open_or_inside_out_does_not_come_back(faces: np.ndarray) -> None:
+def test_an_open_or_inverted_mesh_is_not_converted_back(faces: np.ndarray) -> None:
     with pytest.raises(MeshError, match="is not a solid"):
         Mesh.from_trimesh(trimesh.Trimesh(tee().vertices, faces, process=False))

@@ -20,7 +20,7 @@ def test_a_box_on_a_pedestal_gains_the_volume_of_a_rounded_prism() -> None:
 
 
 @pytest.mark.parametrize("name", ["box", "tee", "branch", "hollow", "bowl", "ball"])
-def test_every_shape_stands_in_one_closed_piece_and_nothing_new_overhangs(name: str) -> None:
+def test_every_shape_on_a_pedestal_is_one_closed_piece_without_new_overhangs(name: str) -> None:
     mesh = getattr(shapes, name)()
     lifted = on_pedestal(mesh, 7.5)
     assert_closed(lifted)
@@ -35,7 +35,7 @@ def test_a_ball_on_a_point_gets_a_decent_base() -> None:
     assert np.hypot(base[:, 0], base[:, 1]).max() == pytest.approx(5.0, abs=0.05)
 
 
-def test_two_feet_stand_on_one_pedestal() -> None:
+def test_two_feet_share_one_pedestal() -> None:
     legs = m3.Manifold.cube((5, 10, 20)) + m3.Manifold.cube((5, 10, 20)).translate((30, 0, 0))
     lifted = on_pedestal(shapes.standing(legs + m3.Manifold.cube((35, 10, 5)).translate((0, 0, 15))), 4.0)
     between = solid_of(lifted).slice(2.0)

@@ -45,7 +45,7 @@ def test_an_absurd_size_is_refused_with_the_scale_that_fits(tmp_path: Path, size
     assert hint in sentence
 
 
-def test_the_units_that_fit_are_told_with_their_scale_the_likeliest_first(tmp_path: Path) -> None:
+def test_the_possible_units_are_listed_with_their_scales_likeliest_first(tmp_path: Path) -> None:
     with pytest.raises(SizeError) as refused:
         read_mesh(files.written(tmp_path / "box.off", files.placed(0.16, 0.1, 0.1)))
     assert refused.value.units == {"metres": 1000.0, "inches": 25.4, "centimetres": 10.0}
@@ -105,7 +105,7 @@ def test_shared_models_read_as_they_are() -> None:
     assert solid.volume() == pytest.approx(198_875, rel=1e-4)
 
 
-def test_a_mesh_of_far_more_faces_than_a_print_shows_is_told_what_to_reduce() -> None:
+def test_a_mesh_with_far_too_many_faces_gets_advice_to_reduce_them() -> None:
     plane = np.zeros((4, 3)), np.zeros((MANY_FACES + 1, 3), np.int32)
     assert too_fine(box()) == ()
     (sentence,) = too_fine(Mesh(*plane))
@@ -134,9 +134,7 @@ def test_a_mesh_of_far_more_faces_than_a_print_shows_is_told_what_to_reduce() ->
         ),
     ],
 )
-def test_a_small_model_is_told_with_the_scale_that_may_be_meant(
-    tmp_path: Path, name: str, size_mm: float, sentence: str | None
-) -> None:
+def test_a_small_model_is_reported_with_the_likely_scale(tmp_path: Path, name: str, size_mm: float, sentence: str | None) -> None:
     file = files.written(tmp_path / name, files.placed(size_mm, 1.0, 1.0))
     assert [*map(terminal_words, read_mesh(file)[1])] == ([] if sentence is None else [sentence])
     assert read_mesh(file, 25.4)[1] == ()

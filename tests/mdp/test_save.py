@@ -36,7 +36,7 @@ def test_a_3mf_holds_every_part_in_its_place_and_is_the_same_bytes_every_time(cu
     assert threemf(cut) == threemf(cut)
 
 
-def test_the_values_tell_the_parts_as_they_are(cut: Decomposition) -> None:
+def test_the_values_describe_the_parts(cut: Decomposition) -> None:
     values = json_values(cut, joints_of(cut.parts, load()), 0.25, 1.5)
     assert [part["file"] for part in values["parts"]] == ["part-01.stl", "part-02.stl"] == [part_file(k) for k in (1, 2)]
     assert sum(part["volume_mm3"] for part in values["parts"]) == pytest.approx(cut.mesh.volume_mm3)

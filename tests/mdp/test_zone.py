@@ -93,7 +93,7 @@ def test_directions_with_fewer_spans_than_others_end_in_spans_that_no_plane_is_i
     np.testing.assert_allclose(spans[:, 1], [[40.0, 60.0], [np.inf, np.inf], [np.inf, np.inf]], atol=2e-6)
 
 
-def test_a_plane_may_lie_in_a_flat_face_of_a_colour_and_touch_its_edges() -> None:
+def test_a_plane_may_be_in_a_flat_face_of_a_colour_and_touch_its_edges() -> None:
     box = shapes.box()
     top = Mesh(box.vertices, box.faces, np.where(box.normals[:, 2] > 0.9, RED, 0).astype(np.int32))
     zones = Zones(keep=(Painted(RED),)).on(top)
@@ -117,7 +117,7 @@ def test_on_a_ball_it_is_a_cap_of_that_angle(angle_deg: float) -> None:
     assert area == pytest.approx(2 * np.pi * 100 * (1 - np.cos(np.radians(angle_deg))), rel=0.06)
 
 
-def test_what_does_not_hang_together_with_it_is_left_out() -> None:
+def test_unconnected_faces_are_left_out() -> None:
     two = both(shapes.box(), shapes.box().transform(np.eye(3), (50.0, 0.0, 0.0)))
     marked = Grown((50.0, 0.0, 20.0), 1.0).faces(two)
     assert two.vertices[two.faces[marked]][:, :, 0].min() == 40.0

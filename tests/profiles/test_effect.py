@@ -97,6 +97,6 @@ def test_a_search_reads_only_what_takes_the_front_away_and_prices_nothing_that_l
         ("search.seam_mm=0", Effect.FRONT),
     ],
 )
-def test_what_a_change_does_to_a_front(setting: str, effect: Effect) -> None:
+def test_the_effect_of_a_change_on_a_front(setting: str, effect: Effect) -> None:
     assert effect_of_change(load(), load(settings=[setting])) == effect
     assert effect_of_change(load(settings=[setting]), load(settings=[setting])) == Effect.NONE

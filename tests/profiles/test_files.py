@@ -13,7 +13,7 @@ from profiles import files
 from profiles.files import LOCK, SHARED, lock, lock_folder, remove_locked, whole_file, write_whole
 
 
-def test_a_file_is_the_old_one_or_the_new_one_and_nothing_stays_beside_it(tmp_path: Path) -> None:
+def test_a_file_is_the_old_or_the_new_one_and_no_temporary_file_remains(tmp_path: Path) -> None:
     file = tmp_path / "work.json"
     write_whole(file, b"old")
 
@@ -82,9 +82,7 @@ def test_a_folder_is_locked_by_one_and_removed_with_its_lock(system: str, tmp_pa
     assert not folder.exists()
 
 
-def test_where_a_disk_has_no_locks_a_folder_is_locked_only_for_whom_that_is_enough(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_without_file_locks_a_folder_counts_as_locked_only_on_request(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def none(*_: object) -> None:
         raise OSError(errno.ENOLCK, "No locks available")
 

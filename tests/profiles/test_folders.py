@@ -51,7 +51,7 @@ def test_the_state_folder_is_below_the_home_and_private(tmp_path: Path, monkeypa
     assert mode(older) == "0o700"
 
 
-def test_without_a_home_nothing_is_made_in_the_current_folder(
+def test_without_a_home_folder_nothing_is_created_in_the_current_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, temporary: Path
 ) -> None:
     monkeypatch.chdir(tmp_path)

@@ -24,7 +24,7 @@ def test_no_two_keys_of_a_group_have_the_same_label() -> None:
     assert [pair for pair, count in Counter((row["group"], row["label"]) for row in ROWS).items() if count > 1] == []
 
 
-def test_every_group_has_a_title_of_its_own() -> None:
+def test_every_group_has_its_own_title() -> None:
     assert {row["group"] for row in ROWS} == set(TITLES)
     assert len(set(TITLES.values())) == len(TITLES)
 

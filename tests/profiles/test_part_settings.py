@@ -18,7 +18,7 @@ def test_a_part_has_its_own_values_and_all_others_those_of_the_process() -> None
     assert profile.of_part(1).process == profile.of_part(3).process == load().process
 
 
-def test_what_is_given_later_stands_over_a_plan_s_settings() -> None:
+def test_later_settings_override_those_of_a_plan() -> None:
     profile = with_part_settings(given("3:walls=5"), [PartSettings(part=3, process={"walls": 2, "top_layers": 9})])
     assert profile.parts == [PartSettings(part=3, process={"walls": 5, "top_layers": 9})]
 
@@ -39,14 +39,14 @@ def test_what_is_given_later_stands_over_a_plan_s_settings() -> None:
         ("2:line_width_mm=0.23", "part 2: process.line_width_mm is 0.23: a 0.4 mm nozzle prints lines of 0.24 to 1 mm"),
     ],
 )
-def test_what_a_part_cannot_have_is_refused_in_one_sentence(text: str, sentence: str) -> None:
+def test_a_key_that_a_part_cannot_set_is_refused_in_one_sentence(text: str, sentence: str) -> None:
     with pytest.raises(ProfileError) as refused:
         given("2:line_width_mm=0.8" if "0.5" in text else "2:walls=3", text)
     assert sentence in str(refused.value)
     assert "\n" not in str(refused.value)
 
 
-def test_all_problems_of_a_part_s_settings_are_told_at_once() -> None:
+def test_all_problems_of_part_settings_are_reported_at_once() -> None:
     with pytest.raises(ProfileError) as refused:
         given("2:walls=-1,line_width_mm=2,scale=2")
     assert str(refused.value).split("; ") == [
@@ -56,7 +56,7 @@ def test_all_problems_of_a_part_s_settings_are_told_at_once() -> None:
     ]
 
 
-def test_where_the_model_is_cut_and_what_parts_share_is_no_part_s_own() -> None:
+def test_keys_of_the_cut_or_shared_by_parts_cannot_be_set_for_one_part() -> None:
     keys = part_keys()
     assert {"walls", "infill_density", "layer_height_mm", "outer_wall_speed_mm_s", "interface_flow"} <= set(keys)
     assert not {"rotate_deg", "self_supporting_angle_deg", "bridge_longest_mm", "skirt_loops", "travel_speed_mm_s"} & set(keys)

@@ -37,14 +37,14 @@ def test_without_own_profiles_only_the_shipped_ones_are_known() -> None:
     assert known("machine") == shipped("machine")
 
 
-def test_an_own_profile_is_taken_by_its_name_and_listed_as_yours(capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_own_profile_is_found_by_its_name_and_listed_as_yours(capsys: pytest.CaptureFixture[str]) -> None:
     keep("machine", "mine", 'inherits = "generic_ac"\n[machine.tilt]\npoint_mm = [0, 1, -18]\n')
     assert load("mine").machine.tilt.point_mm == (0.0, 1.0, -18.0)
     assert main(["profiles", "list"]) == 0
     assert f"machine, yours ({own_folder('machine')}): mine\n" in capsys.readouterr().out
 
 
-def test_an_own_profile_stands_in_the_place_of_the_shipped_one_it_inherits() -> None:
+def test_an_own_profile_replaces_the_shipped_one_it_inherits() -> None:
     keep("machine", "gen5x", 'inherits = "gen5x"\n[machine.tilt]\nzero_deg = 1.5\n')
     machine = load("gen5x").machine
     assert (machine.tilt.zero_deg, machine.x.limits_mm) == (1.5, (-126.0, 125.0))
@@ -58,7 +58,7 @@ def test_an_own_material_and_process_inherit_from_shipped_and_own_ones() -> None
     assert (material.flow, material.nozzle_c, material.name) == (0.97, 231.0, load(material="petg").material.name)
 
 
-def test_the_shipped_profile_below_another_is_found_by_way_of_own_ones() -> None:
+def test_the_shipped_base_of_a_profile_is_found_through_own_ones() -> None:
     keep("material", "shop", 'inherits = "petg"\n[material]\nflow = 0.97\n')
     keep("material", "shop_red", 'inherits = "shop"\n[material]\nnozzle_c = 231\n')
     keep("material", "alone", "[material]\nnozzle_c = 231\n")
@@ -75,13 +75,13 @@ def test_own_profiles_that_inherit_each_other_are_refused() -> None:
         load_one("a")
 
 
-def test_an_unknown_name_is_answered_with_the_own_ones_too() -> None:
+def test_an_unknown_name_is_refused_with_a_list_that_includes_own_profiles() -> None:
     keep("machine", "mine", 'inherits = "generic_ac"\n[machine]\nlift_mm = 1\n')
     with pytest.raises(ProfileError, match=r"gen5x, generic_ac, linuxcnc_xyzac, mine, open5x"):
         load("yours")
 
 
-def test_all_problems_of_a_machine_are_told_at_once(tmp_path: Path) -> None:
+def test_all_problems_of_a_machine_are_reported_at_once(tmp_path: Path) -> None:
     file = keep(
         "machine",
         "bad",
@@ -125,7 +125,7 @@ def test_a_missing_parent_does_not_hide_the_other_problems() -> None:
     assert [*map(terminal_words, problems[1:])] == ["process.walls is -1: it must be a whole number from 0 to 50"]
 
 
-def test_checking_a_machine_tells_every_block_that_cannot_be_filled_in(capsys: pytest.CaptureFixture[str]) -> None:
+def test_checking_a_machine_reports_every_block_that_cannot_be_filled_in(capsys: pytest.CaptureFixture[str]) -> None:
     file = keep("machine", "bad", 'inherits = "generic_ac"\n[machine.gcode]\nstart = "M104 S{heat}"\nend = "G1 {tlit}0"\n')
     assert main(["profiles", "check", str(file)]) == 1
     errors = capsys.readouterr().err
@@ -133,7 +133,7 @@ def test_checking_a_machine_tells_every_block_that_cannot_be_filled_in(capsys: p
     assert "machine.gcode.end: placeholder {tlit} is not known" in errors
 
 
-def test_what_is_shown_of_a_machine_tells_where_each_number_comes_from(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_shown_machine_states_the_source_of_each_number(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["profiles", "show", "open5x_voron0"]) == 0
     lines = {line.partition(" = ")[0]: line for line in capsys.readouterr().out.splitlines()}
     assert lines["machine.x.limits_mm"].endswith("config.g, M208 M203 M201")

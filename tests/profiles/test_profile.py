@@ -89,7 +89,7 @@ def test_a_share_is_also_read_as_a_percentage() -> None:
         ("machine.tilt.colour=3", "machine.tilt.colour is not a key of a profile (`profiles show` lists them)"),
         ("process.layer_height_mm=5", "process.layer_height_mm is 5: it must be a number from 0.02 to 2"),
         ("process.layer_height_mm=nan", "process.layer_height_mm is nan: it must be a number from 0.02 to 2"),
-        ("process.scale=0", "process.scale is 0: it must be a number above 0 and up to 100000"),
+        ("process.scale=0", "process.scale is 0: it must be a number above 0 and up to 100000 or a percentage"),
         ("process.bridge_longest_mm=0", "process.bridge_longest_mm is 0: it must be a number from 1 to 100"),
         ("search.least_volume_share=1", "search.least_volume_share is 1: it must be a number from 0 and below 1 or a percentage"),
         ("process.walls=2.5", "process.walls is 2.5: it must be a whole number from 0 to 50"),
@@ -187,7 +187,7 @@ def test_a_set_option_that_is_no_key_and_value_is_refused(setting: str) -> None:
     assert refusal(setting) == expected
 
 
-def test_all_problems_are_told_at_once() -> None:
+def test_all_problems_are_reported_at_once() -> None:
     text = refusal("process.walls=-1", "search.beam_width=0", "machine.x.speed_mm_s=0", "material.fan=2")
     assert [problem.split(" ")[0] for problem in text.split("; ")] == [
         "machine.x.speed_mm_s",
@@ -198,7 +198,7 @@ def test_all_problems_are_told_at_once() -> None:
     assert refusal("material.nozzle_c=400", "material.bed_c=150").count("allows at most") == 2
 
 
-def test_what_keys_must_be_together_is_told_with_what_each_must_be_and_what_the_machine_allows() -> None:
+def test_conflicting_keys_are_reported_with_the_limits_of_each() -> None:
     assert refusal("process.layer_height_mm=0.5", "process.interlock_mm=1", "process.walls=-1", "material.nozzle_c=400").split(
         "; "
     ) == [
@@ -245,7 +245,7 @@ def test_adaptive_layers_are_not_thicker_than_the_nozzle_is_wide() -> None:
     assert load(settings=thick).process.most_layer_height_mm == 0.6
 
 
-def test_nothing_is_told_of_a_value_that_nobody_gave() -> None:
+def test_no_message_names_a_value_that_was_not_given() -> None:
     """0.3 mm grooves are too deep for layers of 0.2 mm, the default that would apply if the wrong height were dropped."""
     assert refusal("process.layer_height_mm=99", "process.interlock_mm=0.3") == (
         "process.layer_height_mm is 99: it must be a number from 0.02 to 2"
@@ -272,7 +272,7 @@ def test_set_understands_numbers_lists_truths_and_texts() -> None:
 
 
 @given(st.integers(0, 50), st.floats(0.11, 0.4))
-def test_what_is_set_is_what_is_loaded_and_the_last_setting_wins(walls: int, height: float) -> None:
+def test_settings_are_loaded_and_the_last_one_wins(walls: int, height: float) -> None:
     process = load(settings=["process.walls=7", f"process.walls={walls}", f"process.layer_height_mm={height!r}"]).process
     assert (process.walls, process.layer_height_mm) == (walls, height)
 
@@ -377,7 +377,7 @@ def test_a_file_that_is_not_there_or_not_text_is_refused(tmp_path: Path) -> None
     assert "TOML in UTF-8 is expected" in check_file(tmp_path / "binary.toml")[0]
 
 
-def test_checking_a_file_tells_every_problem_of_every_table(tmp_path: Path) -> None:
+def test_checking_a_file_reports_every_problem_of_every_table(tmp_path: Path) -> None:
     text = 'inherits = "standard"\n[process]\nwalls = -1\ninfil_density = 0.5\n[search]\nbeam_width = 0\n'
     assert [*map(terminal_words, check_file(Path(written(tmp_path, text))))] == [
         "process.walls is -1: it must be a whole number from 0 to 50",
@@ -463,16 +463,14 @@ def test_a_machine_without_heated_bed_takes_any_material() -> None:
         ((), {}),
     ],
 )
-def test_what_means_nothing_beside_other_settings_of_a_search_is_nothing(
-    given: tuple[str, ...], nothing: dict[str, object]
-) -> None:
+def test_search_settings_without_effect_are_normalised(given: tuple[str, ...], nothing: dict[str, object]) -> None:
     search = load(settings=given).search
     assert search.effective.model_dump().items() >= nothing.items()
     assert search.effective.effective == search.effective
     assert not given or search.effective != search
 
 
-def test_what_an_earlier_version_has_recorded_is_read_without_the_keys_that_are_gone() -> None:
+def test_records_of_earlier_versions_are_read_without_removed_keys() -> None:
     recorded = load().model_dump(mode="json")
     recorded["process"] |= {"wall_generator": "classic", "walls": 5}
     assert profile_of_tables(recorded).process.walls == 5

@@ -30,7 +30,7 @@ def test_a_byte_order_mark_is_fine(tmp_path: Path) -> None:
     assert load(process=str(tmp_path / "own.toml")).process.walls == 2
 
 
-def test_profiles_may_inherit_by_way_of_others_but_not_without_end(tmp_path: Path) -> None:
+def test_profiles_may_inherit_through_others_but_not_in_a_cycle(tmp_path: Path) -> None:
     for k in range(40):
         (tmp_path / f"{k}.toml").write_text(f'inherits = "{k + 1}.toml"\n[process]\nwalls = 2\n')
     (tmp_path / "40.toml").write_text('inherits = "standard"\n[process]\nwalls = 2\n')

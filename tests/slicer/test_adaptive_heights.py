@@ -41,7 +41,7 @@ def test_steep_sides_get_the_most_and_shallow_ones_the_least(slope: float, expec
 
 @settings(max_examples=15, deadline=None)
 @given(st.floats(3, 30), st.floats(0.03, 0.2), st.booleans())
-def test_no_step_of_a_sphere_is_deeper_than_asked(radius: float, cusp: float, on_plate: bool) -> None:
+def test_no_step_of_a_sphere_is_deeper_than_set(radius: float, cusp: float, on_plate: bool) -> None:
     ball = standing(m3.Manifold.sphere(radius, 64))
     at = layer_heights(ball, adaptive(cusp), on_plate)
     low = np.maximum(at.tip_mm - at.height_mm, 0)

@@ -23,7 +23,7 @@ def test_every_kind_of_bead_has_its_width() -> None:
         assert {path.width_mm for path in of_kind(sliced, kind)} == {width}
 
 
-def test_all_beads_of_a_parts_first_layer_have_one_width_on_the_platform_and_another_one_on_plastic() -> None:
+def test_first_layer_beads_have_one_width_on_the_plate_and_another_on_plastic() -> None:
     chosen = profile("process.first_layer_line_width_mm=0.6", "process.interface_line_width_mm=0.7", *BY_KIND)
     base, top = (slice_part(part, chosen) for part in cut(box(10, 10, 6), ((0.0, 0.0, 1.0), 3.0)))
     assert {path.width_mm for path in base.layers[0].paths if path.kind is not Kind.GAP} == {0.6}
@@ -40,7 +40,7 @@ def test_an_outer_wall_runs_half_its_own_width_inside(width: float) -> None:
 
 @pytest.mark.parametrize("key", ["first_layer", "outer_wall", "top_skin"])
 @pytest.mark.parametrize("width", [0.3, 0.7])
-def test_a_solid_part_extrudes_its_volume_whatever_the_widths(key: str, width: float) -> None:
+def test_a_solid_part_extrudes_its_volume_with_any_widths(key: str, width: float) -> None:
     mesh = box(20, 15, 3)
     sliced = slice_part(whole(mesh), profile(*SOLID, f"process.{key}_line_width_mm={width}"))
     assert sliced.volume_mm3 == pytest.approx(mesh.volume_mm3, rel=0.015)
@@ -54,7 +54,7 @@ def test_wide_infill_keeps_its_density() -> None:
     assert volume_mm3(wide, Kind.INFILL) == pytest.approx(volume_mm3(plain, Kind.INFILL), rel=0.05)
 
 
-def test_the_first_layers_flow_is_its_own() -> None:
+def test_the_first_layer_has_its_own_flow() -> None:
     plain, rich = (slice_part(whole(box(20, 20, 1)), profile(f"process.first_layer_flow={f}")) for f in (1.0, 1.1))
     ratios = [b.volumes_mm3.sum() / a.volumes_mm3.sum() for a, b in zip(plain.layers, rich.layers, strict=True)]
     assert ratios == pytest.approx([1.1, 1.0, 1.0, 1.0, 1.0])
@@ -62,7 +62,7 @@ def test_the_first_layers_flow_is_its_own() -> None:
 
 @settings(max_examples=5)
 @given(st.sampled_from([0.0125, 0.025, 0.05, 0.2]), st.integers(0, 3))
-def test_no_point_of_a_path_lies_farther_than_the_resolution_from_its_simplified_path(resolution_mm: float, seed: int) -> None:
+def test_no_point_of_a_path_is_farther_than_the_resolution_from_its_simplification(resolution_mm: float, seed: int) -> None:
     waves = 8.0 + np.random.default_rng(seed).normal(0.0, 0.1, 90)
     turn = 2.0 * np.pi * np.arange(90) / 90
     outline = m3.CrossSection([np.column_stack([waves * np.cos(turn), waves * np.sin(turn)])])

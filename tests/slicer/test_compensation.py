@@ -36,7 +36,7 @@ def plate(hole_mm: float = 4.0) -> Polygons:
 
 @settings(max_examples=20)
 @given(seeds, st.sampled_from((-0.2, -0.05, 0.1, 0.25)), st.sampled_from((-0.1, 0.0, 0.3)))
-def test_outsides_and_holes_are_offset_each_by_its_own(seed: int, outline_mm: float, hole_mm: float) -> None:
+def test_outsides_and_holes_have_their_own_offsets(seed: int, outline_mm: float, hole_mm: float) -> None:
     section = blocks(seed)
     expected = shapely.union_all(
         [
@@ -52,7 +52,7 @@ def test_outsides_and_holes_are_offset_each_by_its_own(seed: int, outline_mm: fl
 
 
 @pytest.mark.parametrize(("outline_mm", "hole_mm"), [(0.2, 0.0), (-0.2, 0.0), (0.2, 0.3), (-0.1, -0.3), (0.0, 0.25)])
-def test_what_another_part_touches_stays_where_it_is_and_the_parts_overlap_nowhere(outline_mm: float, hole_mm: float) -> None:
+def test_contact_faces_of_parts_are_not_offset_and_parts_do_not_overlap(outline_mm: float, hole_mm: float) -> None:
     whole, right_half = plate(), Polygons.square((20.0, 40.0)).translate((0.0, -20.0))
     right, left = whole ^ right_half, whole - right_half
     asked = process(outline_mm, hole_mm)
@@ -89,9 +89,7 @@ def test_a_section_with_no_compensation_is_itself_and_of_nothing_there_is_nothin
 
 
 @pytest.mark.parametrize(("outline_mm", "hole_mm", "reach"), [(0.2, 0.1, 0.2), (-0.2, -0.3, 0.3), (-0.2, 0.3, 0.0)])
-def test_plastic_lies_outside_a_model_as_far_as_its_outside_grows_or_its_holes_shrink(
-    outline_mm: float, hole_mm: float, reach: float
-) -> None:
+def test_plastic_outside_a_model_is_within_the_compensation(outline_mm: float, hole_mm: float, reach: float) -> None:
     asked = process(outline_mm, hole_mm)
     assert reach_mm(asked) == reach
     grown = as_shapely(compensated(plate(), NOTHING, (), process=asked))

@@ -72,7 +72,7 @@ def test_the_picture_holds_the_whole_layer() -> None:
     assert (points < (x + width, y + height)).all()
 
 
-def test_every_kind_has_a_colour_of_its_own() -> None:
+def test_every_kind_has_a_different_colour() -> None:
     assert set(COLOURS) == set(Kind)
     assert len(set(COLOURS.values())) == len(Kind)
 

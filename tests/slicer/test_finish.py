@@ -30,7 +30,7 @@ def outer_sizes_mm(sliced: SlicedPart) -> list[float]:
 
 
 @pytest.mark.parametrize(("outline_mm", "hole_mm", "sizes"), [(0, 0, (20, 10)), (0.1, 0, (20.2, 10)), (-0.15, 0.2, (19.7, 10.4))])
-def test_outsides_and_holes_are_moved_as_asked(outline_mm: float, hole_mm: float, sizes: tuple[float, float]) -> None:
+def test_outsides_and_holes_are_offset_as_set(outline_mm: float, hole_mm: float, sizes: tuple[float, float]) -> None:
     asked = (f"process.outline_compensation_mm={outline_mm}", f"process.hole_compensation_mm={hole_mm}")
     sliced = slice_part(whole(tube()), profile(*BARE, *asked))
     assert outer_sizes_mm(sliced) == pytest.approx(sizes, abs=0.01)
@@ -54,7 +54,7 @@ def _ends_along_x(sliced: SlicedPart, layer: int) -> tuple[float, float]:
     return float(middle[:, 0].min()), float(middle[:, 0].max())
 
 
-def test_a_top_is_ironed_with_dense_lines_across_its_own() -> None:
+def test_a_top_is_ironed_with_dense_lines_across_its_lines() -> None:
     sliced = slice_part(whole(box(10, 10, 2)), profile(*BARE, "process.ironing=true"))
     assert {k for k, layer in enumerate(sliced.layers) if any(path.kind is Kind.IRONING for path in layer.paths)} == {9}
     last = sliced.layers[-1]
@@ -67,7 +67,7 @@ def test_a_top_is_ironed_with_dense_lines_across_its_own() -> None:
 
 
 @pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.05, 0.0, 1.0)])
-def test_nothing_is_ironed_where_another_part_comes(normal: tuple[float, float, float]) -> None:
+def test_nothing_is_ironed_under_another_part(normal: tuple[float, float, float]) -> None:
     low, high = cut(box(), (normal, 8.0))
     ironing = profile(*BARE, "process.ironing=true")
     alone, under = slice_part(low, ironing), slice_part(low, ironing, later=[high])
@@ -91,7 +91,7 @@ def overhanging(step_mm: float) -> Part:
         (0.52, Kind.OVERHANG, 15.0, 1.0),
     ],
 )
-def test_walls_are_slower_and_cooler_the_less_of_them_lies_on_plastic(
+def test_walls_are_slower_and_cooler_the_less_plastic_is_below(
     step_mm: float, kind: Kind, speed: float, fan: float | None
 ) -> None:
     slow = ("process.least_layer_time_s=0", "process.inner_wall_speed_mm_s=80", "material.fan_layer_time_s=1")
@@ -101,7 +101,7 @@ def test_walls_are_slower_and_cooler_the_less_of_them_lies_on_plastic(
     assert wall.fan == (None if fan is None else pytest.approx(fan, abs=0.03))
 
 
-def test_layers_with_overhanging_walls_get_more_of_them_where_that_is_asked_for() -> None:
+def test_layers_with_overhanging_walls_get_more_walls_when_set() -> None:
     sliced = slice_part(overhanging(0.4), profile(*BARE, "process.overhang_extra_walls=2"))
     counts = [sum(path.kind is Kind.INNER_WALL for path in sliced.layers[k].paths) for k in (5, 10, 15)]
     assert counts == [2, 4, 2]
@@ -139,7 +139,7 @@ def test_pins_and_thin_walls_keep_their_first_layer(side_mm: float) -> None:
     assert kept == pytest.approx(whole_foot, rel=1e-3)
 
 
-def test_the_second_layer_lies_on_what_the_plate_squeezes_out() -> None:
+def test_the_second_layer_is_laid_on_the_squeezed_first_layer() -> None:
     shape = whole(standing(m3.Manifold.cylinder(6, 8, 10)))
     usual, less = (
         slice_part(shape, profile(*BARE, "process.overhang_share=0.7", f"process.elephant_foot_mm={foot_mm}")).layers[1]

@@ -49,7 +49,7 @@ def test_a_remainder_thinner_than_the_least_layer_is_shared_by_the_last_ones() -
     assert equal_heights(0.545, fine, 0.4, 0.2).height_mm == pytest.approx([0.2, 0.1, 0.1225, 0.1225])
 
 
-def test_a_plate_thinner_than_the_least_layer_is_one_such_layer() -> None:
+def test_a_slab_thinner_than_the_least_layer_is_one_such_layer() -> None:
     assert equal_heights(0.03, PROCESS, 0.4, 0.3).height_mm == pytest.approx([0.08])
 
 
@@ -80,7 +80,7 @@ def test_the_top_is_met_and_no_layer_is_too_high_or_too_thin(
 
 
 @given(st.floats(0.3, 9.0), st.floats(0.08, 9.0), st.floats(0, 1))
-def test_neither_a_pedestal_nor_what_stands_on_it_has_a_layer_too_thin(pedestal: float, model: float, gap: float) -> None:
+def test_neither_a_pedestal_nor_the_model_on_it_has_a_too_thin_layer(pedestal: float, model: float, gap: float) -> None:
     profile = load(settings=[f"process.pedestal_gap_mm={gap!r}"])
     at = layer_heights(box(9, 9, pedestal + model), profile, True, pedestal)
     assert at.height_mm.min() >= 0.08 - 1e-9

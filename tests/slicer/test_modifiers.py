@@ -126,7 +126,7 @@ def plain_mm3() -> float:
 @pytest.mark.parametrize("own", [{"walls": 6}, {"walls": 1}, {"infill_pattern": "gyroid"}, {"skin_speed_mm_s": 20.0}])
 @settings(max_examples=4, deadline=None)
 @given(st.floats(-14.0, 14.0), st.floats(-14.0, 14.0), st.floats(0.0, 90.0))
-def test_a_solid_part_extrudes_its_volume_whatever_holds_in_a_box(own: dict[str, Any], x: float, y: float, turn: float) -> None:
+def test_a_solid_part_extrudes_its_volume_with_any_modifier(own: dict[str, Any], x: float, y: float, turn: float) -> None:
     c, s = np.cos(np.radians(turn)), np.sin(np.radians(turn))
     leaning = Zone((x - 9.0, y - 6.0, -1.0), (x + 9.0, y + 6.0, 99.0), ((c, s, 0.0), (-s, c, 0.0), (0.0, 0.0, 1.0)))
     other = slice_part(modified(whole(bored_plate()), (leaning, own)), profile(*SOLID))
@@ -134,7 +134,7 @@ def test_a_solid_part_extrudes_its_volume_whatever_holds_in_a_box(own: dict[str,
 
 
 @pytest.mark.parametrize("own", [{"walls": 6}, {"walls": 1}])
-def test_parts_of_a_cut_extrude_their_volumes_whatever_holds_in_a_box(own: dict[str, Any]) -> None:
+def test_parts_of_a_cut_extrude_their_volumes_with_any_modifier(own: dict[str, Any]) -> None:
     parts = cut(standing(m3.Manifold.cube((24.0, 20.0, 20.0))), ((0.6, 0.0, 0.8), 13.0))
     within = Zone((-6.0, -5.0, -1.0), (7.0, 99.0, 99.0))
     plain, other = (slice_parts(each, profile(*SOLID)) for each in (parts, [modified(part, (within, own)) for part in parts]))
@@ -171,7 +171,7 @@ def test_layers_between_two_heights_are_those_of_a_print_with_their_settings() -
     assert [same(a, b) for a, b in zip(some.layers, plain.layers, strict=True)] == [not 20 <= k < 30 for k in range(50)]
 
 
-def test_of_two_modifiers_the_later_one_wins_where_both_say_something() -> None:
+def test_the_later_of_two_modifiers_wins_where_both_set_a_key() -> None:
     sparse, dense = {"infill_density": 0.1, "walls": 5}, {"infill_density": 0.5}
     first = sliced(modified(BLOCK, (RIGHT, sparse), (SLAB, dense))).layers[25]
     then = sliced(modified(BLOCK, (SLAB, dense), (RIGHT, sparse))).layers[25]
@@ -219,7 +219,7 @@ def test_a_modifier_that_reaches_no_plastic_changes_no_byte(own: dict[str, Any])
     assert content(sliced(beside)) == content(sliced(BLOCK))
 
 
-def test_a_part_that_leans_has_the_settings_where_the_box_lies_in_the_workpiece() -> None:
+def test_a_tilted_part_has_the_settings_where_the_box_is_in_the_workpiece() -> None:
     leaning = cut(standing(m3.Manifold.cube((40.0, 40.0, 40.0))), ((0.6, 0.0, 0.8), 28.0))[1]
     box_ = Zone((-99.0, 1.0, -99.0), (99.0, 99.0, 99.0))
     layer = slice_part(modified(leaning, (box_, {"infill_density": 1.0})), profile(*BARE)).layers[20]

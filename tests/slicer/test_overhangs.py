@@ -111,7 +111,7 @@ def test_a_cone_up_to_the_self_supporting_angle_hangs_nowhere(angle_deg: float, 
     assert hanging_mm2(overhangs_of(funnel(angle_deg, foot_mm))) == {}
 
 
-def test_what_begins_in_mid_air_hangs_with_all_of_its_section() -> None:
+def test_a_section_that_begins_in_mid_air_overhangs_completely() -> None:
     peg = CUBE((4, 3, 8)).translate((20, 2, 14))
     overhangs = overhangs_of(standing(CUBE((8, 8, 20)) + CUBE((30, 8, 4)).translate((0, 0, 20)) + peg))
     begun, arm = round(14 / LAYER_MM), round(20 / LAYER_MM)
@@ -133,7 +133,7 @@ def test_the_first_layer_of_a_later_part_hangs_where_it_reaches_over_the_one_bef
     assert hanging_mm2(overhangs) == {0: pytest.approx(40 * 10 - 10 * 10, rel=0.01)}
 
 
-def test_what_hangs_where_a_person_wants_no_support_is_told_apart() -> None:
+def test_overhangs_in_a_zone_without_support_are_reported_separately() -> None:
     part = whole(tee())
     right_arm = Marked((Zone((4.5, -10.0, -1.0), (25.0, 10.0, 35.0)),))
     overhang = find_overhangs(section_part(replace(part, no_support=right_arm), profile()))[round(30 / LAYER_MM)]
@@ -170,13 +170,13 @@ SLOPES = {"a flat cone": funnel(65, 5), "a steep cone": funnel(40, 5), "a ball":
 
 
 @pytest.mark.parametrize("name", LEVEL)
-def test_of_level_faces_the_slicer_supports_what_the_search_counts_within_a_hundredth(name: str) -> None:
+def test_the_slicer_supports_the_level_faces_that_the_search_counts_within_one_percent(name: str) -> None:
     hanging = sum(hanging_mm2(overhangs_of(LEVEL[name])).values())
     assert hanging == pytest.approx(needed_mm2(LEVEL[name]), rel=0.01, abs=1e-6)
 
 
 @pytest.mark.parametrize("name", SLOPES)
-def test_of_slopes_they_agree_within_what_a_layer_at_either_end_is_wide(name: str) -> None:
+def test_slicer_and_search_agree_on_slopes_within_a_layer_at_either_end(name: str) -> None:
     """The layers cover a slope only between the middle of its lowest layer and that of its highest."""
     hanging = sum(hanging_mm2(overhangs_of(SLOPES[name])).values())
     assert hanging == pytest.approx(needed_mm2(SLOPES[name]), rel=0.08, abs=1e-6)

@@ -73,7 +73,7 @@ def test_the_first_part_in_order_that_gives_no_path_is_named(cores: int, monkeyp
         slice_parts(cut(box(10, 10, 18), *PLANES), nothing)
 
 
-def test_no_parts_are_sliced_to_none() -> None:
+def test_slicing_no_parts_gives_none() -> None:
     assert slice_parts((), profile()) == ()
 
 
@@ -96,7 +96,7 @@ slicer.slice.slice_parts(cut(box(10, 10, 60), ((0.0, 0.0, 1.0), 30.0)), profile(
 
 
 @pytest.mark.parametrize("ended_by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_whatever_ends_the_parent_ends_its_processes(ended_by: signal.Signals) -> None:
+def test_any_end_of_the_parent_ends_its_processes(ended_by: signal.Signals) -> None:
     with subprocess.Popen([sys.executable, "-c", SLICING], stdout=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
         children = []

@@ -90,7 +90,7 @@ def test_the_first_layer_on_a_raft_is_neither_squeezed_nor_widened_nor_hotter() 
     assert first.volumes_mm3.sum() == pytest.approx(plain.volumes_mm3.sum(), rel=1e-3)
 
 
-def test_the_raft_s_own_first_layer_is_the_one_on_the_plate() -> None:
+def test_the_first_layer_of_the_raft_is_on_the_plate() -> None:
     asked = ("process.first_layer_flow=1.1", "process.first_layer_speed_mm_s=13", "material.first_layer_nozzle_c=230")
     first, second = raft_of(box(), *asked)[:2]
     assert first.nozzle_add_c == 230.0 - profile().material.nozzle_c
@@ -128,7 +128,7 @@ def test_thick_first_layers_give_support_on_a_raft_several_layers_to_fill_the_ga
     assert [layer.z_mm for layer in filling] == pytest.approx([0.06, 0.32])
 
 
-def test_what_would_sag_onto_the_plate_has_raft_under_it() -> None:
+def test_overhangs_near_the_plate_have_raft_under_them() -> None:
     ledge = m3.Manifold.cube((10, 10, 4), True) + m3.Manifold.cube((10, 30, 3.8), True).translate((0, 0, 0.1))
     reached = max(float(np.abs(layer.points[:, 1]).max()) for layer in raft_of(standing(ledge), *BARE))
     assert reached == pytest.approx(15.0 + 1.5 + 3.0 - 0.225, abs=0.02)
@@ -147,7 +147,7 @@ def test_a_part_on_another_part_has_no_raft() -> None:
     assert above.volume_mm3 == pytest.approx(plain.volume_mm3, rel=1e-9)
 
 
-def test_a_vase_may_stand_on_a_raft() -> None:
+def test_a_vase_may_be_printed_on_a_raft() -> None:
     sliced = slice_part(whole(box(20, 20, 6)), profile(RAFT, "process.spiral_vase=true"))
     assert sliced.layers[4].z_mm == pytest.approx(-0.1)
     assert sliced.layers[-1].z_mm == pytest.approx(6.0)

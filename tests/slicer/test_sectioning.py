@@ -11,7 +11,7 @@ from tests.slicer.hand import BARE, SOLID, profile, whole
 
 
 @pytest.mark.parametrize(("rise_mm", "share"), [(0.25, 1.0), (0.6, 0.5), (1.2, 0.25)])
-def test_a_base_that_is_not_quite_level_is_laid_on_the_plate_as_far_as_it_stands(rise_mm: float, share: float) -> None:
+def test_a_base_that_is_not_quite_level_is_flattened_onto_the_plate(rise_mm: float, share: float) -> None:
     """A plate of 30 x 30 mm whose underside rises to one side: up to 0.3 mm it rests on the plate, beyond that it overhangs."""
 
     def first_layer_mm3(rise_mm: float) -> float:

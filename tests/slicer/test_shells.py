@@ -12,7 +12,7 @@ from tests.slicer.hand import profile, whole
 
 
 @pytest.mark.parametrize("layer", [20, 45, 47, 49, 60])
-def test_a_layer_asked_for_alone_is_solid_where_it_is_in_the_whole_part(layer: int) -> None:
+def test_a_single_requested_layer_is_solid_where_it_is_in_the_whole_part(layer: int) -> None:
     """A pocket's walls begin above layer 49 and also make the infill around its floor's skin solid."""
     block = m3.Manifold.cube((40.0, 40.0, 20.0)) - m3.Manifold.cube((12.0, 12.0, 20.0)).translate((14.0, 14.0, 10.0))
     sections = section_part(whole(standing(block)), profile())

@@ -41,7 +41,7 @@ def test_layers_with_nothing_wide_enough_for_a_line_below_others_are_counted(thi
     assert (sliced.too_thin, sliced.too_thin_mm) == (layers, pytest.approx(1.2 if layers else 0.0))
 
 
-def test_what_would_begin_above_the_plate_is_refused() -> None:
+def test_a_part_that_would_begin_above_the_plate_is_refused() -> None:
     hair = m3.Manifold.cube((2, 0.08, 1.0)).translate((1, 2, 0)) + m3.Manifold.cube((4, 4, 1)).translate((0, 0, 1.0))
     said = r"part 1 would begin in air, 1.00 mm above the plate: .* lines of 0.45 mm: .*, or process.support = auto"
     with pytest.raises(SliceError, match=said):
@@ -71,7 +71,7 @@ def test_a_solid_real_model_extrudes_its_volume(name: str) -> None:
 
 
 @pytest.mark.parametrize("pattern", ["rectilinear", "grid", "triangles", "concentric"])
-def test_every_point_lies_inside_the_section(pattern: str) -> None:
+def test_every_point_is_inside_the_section(pattern: str) -> None:
     mesh = branch()
     sliced = slice_part(whole(mesh), profile(*BARE, f"process.infill_pattern={pattern}"))
     for layer in sliced.layers[::17]:
@@ -80,7 +80,7 @@ def test_every_point_lies_inside_the_section(pattern: str) -> None:
 
 
 @pytest.mark.parametrize("overlap", [0.0, 0.3])
-def test_without_walls_no_stroke_reaches_farther_out_than_half_of_itself(overlap: float) -> None:
+def test_without_walls_no_stroke_extends_beyond_half_its_width(overlap: float) -> None:
     bare = profile("process.walls=0", "process.infill_density=0.2", f"process.infill_overlap={overlap}")
     sliced = slice_part(whole(standing(m3.Manifold.cube((20, 20, 6), True))), bare)
     assert of_kind(sliced, Kind.BRIDGE)
@@ -90,7 +90,7 @@ def test_without_walls_no_stroke_reaches_farther_out_than_half_of_itself(overlap
     assert np.abs(points[:, :2]).max() <= 10.0 - least_mm + 1e-3
 
 
-def test_infill_is_as_dense_as_asked() -> None:
+def test_infill_has_the_density_that_is_set() -> None:
     thick = standing(m3.Manifold.cube((60, 60, 4)))
     settings_ = [(*BARE, f"process.infill_density={d}") for d in (0.0, 0.3)]
     empty, filled = (slice_part(whole(thick), profile(*s)) for s in settings_)
@@ -101,7 +101,7 @@ def test_infill_is_as_dense_as_asked() -> None:
     assert of_kind(empty, Kind.INFILL) == []
 
 
-def test_layers_stand_at_their_heights_from_the_platform() -> None:
+def test_layers_are_at_their_heights_above_the_build_plate() -> None:
     sliced = slice_part(whole(box(5, 5, 1)), profile("process.first_layer_height_mm=0.3"))
     assert [layer.z_mm for layer in sliced.layers] == pytest.approx([0.3, 0.5, 0.7, 0.9, 1.0])
 
@@ -118,7 +118,7 @@ def test_a_part_on_plastic_is_pressed_in_solid_slow_and_rich() -> None:
     assert first.nozzle_add_c == 10.0
 
 
-def test_a_part_in_its_own_frame_does_not_care_how_it_stood_in_the_workpiece() -> None:
+def test_slicing_a_part_does_not_depend_on_its_pose_in_the_workpiece() -> None:
     base, arm = cut(branch(), ((np.sin(np.pi / 3), 0, 0.5), 14.0))
     sliced = slice_part(arm, profile(*SOLID), [base])
     rich = 0.1 * sliced.layers[0].volumes_mm3.sum() / 1.1
@@ -209,7 +209,7 @@ def test_a_layer_higher_than_the_nozzle_is_wide_is_refused(key: str) -> None:
         profile(f"process.{key}=0.5", "process.line_width_mm=0.8")
 
 
-def test_islands_below_one_line_are_printed_beside_larger_ones() -> None:
+def test_islands_narrower_than_a_line_are_printed_beside_larger_ones() -> None:
     pins = m3.Manifold.cylinder(2, 0.2, 0.2, 16).translate((8, 0, 0)) + m3.Manifold.cylinder(2, 0.09, 0.09, 8).translate(
         (-8, 0, 0)
     )

@@ -95,7 +95,7 @@ def supported_tee() -> SlicedPart:
 
 
 @pytest.mark.parametrize("zone", [RIGHT_ARM, RIGHT_MESH, Grown((12.0, 0.0, 30.0), 1.0)])
-def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zone: AnyZone) -> None:
+def test_a_zone_without_support_has_none_and_the_rest_has_its_own(zone: AnyZone) -> None:
     part, free = whole(tee()), supported_tee()
     (without,) = slice_parts([replace(part, no_support=Marked.of(part.mesh, [zone]))], SUPPORTED)
     assert support_x_mm(free).max() > 15.0
@@ -106,13 +106,13 @@ def test_where_no_support_is_wanted_none_is_printed_and_the_rest_has_its_own(zon
     assert volume_mm3(without, Kind.SUPPORT) == pytest.approx(0.5 * volume_mm3(free, Kind.SUPPORT), rel=0.1)
 
 
-def test_what_is_supported_nowhere_is_estimated_without_support() -> None:
+def test_a_model_without_support_is_estimated_without_it() -> None:
     part = whole(tee())
     counted = [estimate(variant, SUPPORTED).support_mm3 for variant in (part, bare(part))]
     assert (counted[0] > 0, counted[1]) == (True, 0)
 
 
-def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> None:
+def test_no_support_is_on_a_marked_top_even_with_thin_layers() -> None:
     block, tips_mm = whole(box(20.0, 20.0, 4.0)), 0.08 * np.arange(1, 101)
     marked = replace(block, no_support=Marked.of(block.mesh, [Grown((0.0, 0.0, 4.0), 1.0)]))
     heights = Heights(tips_mm, np.full(100, 0.08), tips_mm - 0.04)
@@ -123,7 +123,7 @@ def test_over_a_marked_top_stands_no_support_where_layers_are_thin_either() -> N
     assert (shut[stands].area(), shut[-1].area()) == (pytest.approx(400.0, rel=0.01), 0.0)
 
 
-def test_a_box_that_leans_shuts_of_each_layer_what_lies_in_it() -> None:
+def test_a_tilted_box_excludes_its_section_of_each_layer() -> None:
     part, half = whole(box(20.0, 20.0, 20.0)), 0.5**0.5
     leaning = Zone((-5.0, -10.0, -5.0), (5.0, 10.0, 5.0), ((half, 0.0, -half), (0.0, 1.0, 0.0), (half, 0.0, half)))
     leaning = leaning.transform(np.eye(3), np.array([0.0, 0.0, 10.0]))
@@ -135,7 +135,7 @@ LEFT = Zone((-30.0, -30.0, -1.0), (0.0, 30.0, 40.0))
 
 
 @pytest.mark.parametrize("zone", [LEFT, Grown((-9.0, 0.0, 5.0), 1.0)])
-def test_a_slope_that_carries_itself_is_supported_where_a_person_wants_it(zone: AnyZone) -> None:
+def test_a_self_supporting_slope_is_supported_where_the_user_marks_it(zone: AnyZone) -> None:
     wedge = whole(leaning_out())
     assert volume_mm3(slice_part(wedge, SUPPORTED), Kind.SUPPORT) == 0.0
     marked = replace(wedge, support=Marked.of(wedge.mesh, (zone,)))

@@ -30,7 +30,7 @@ def test_the_standard_weights_order_four_of_five_pairs_as_the_judges_do() -> Non
     assert fit_choices.ordered(pairs, fit_choices.weights_of(load())).mean() >= 0.8
 
 
-def test_weights_are_found_by_which_pairs_were_ordered() -> None:
+def test_weights_are_recovered_from_ordered_pairs() -> None:
     rng, true = np.random.default_rng(1), np.array([1.0, 4.0, 0.0, 0.2])
     differences = rng.normal(size=(2000, 4))
     differences *= np.sign(differences @ true)[:, None]
@@ -86,9 +86,7 @@ def test_a_letter_with_two_marks_is_refused(tmp_path: Path) -> None:
         fit_choices.read_verdicts(file)
 
 
-def test_two_judges_of_one_mind_count_twice_and_one_who_judges_again_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_two_agreeing_judges_count_twice_and_a_repeated_judgement_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fit_choices, "BOOK", tmp_path / "book.jsonl")
     fit_choices.BOOK.write_text(json.dumps({"sheet": "post_60", "alternatives": {"A": {"planes": []}}, "verdicts": []}) + "\n")
     models, offers = tmp_path / "list.csv", tmp_path / "offers.jsonl"

@@ -63,9 +63,7 @@ def test_a_cut_is_judged_by_moves_missing_and_doubled_and_by_the_height(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("advanced", "most"), [(False, 20), (True, 23)])
-def test_power_cuts_lose_no_stroke_and_no_height_that_was_not_asked_for(
-    monkeypatch: pytest.MonkeyPatch, advanced: bool, most: int
-) -> None:
+def test_power_cuts_lose_no_stroke_and_no_height(monkeypatch: pytest.MonkeyPatch, advanced: bool, most: int) -> None:
     monkeypatch.setattr(kills, "LAYERS", 3)
     for cut in campaign(4, 5, BuildOptions(advanced_ok=advanced, rx_ring=RING), power=True):
         assert (cut.gap, cut.twice <= most) == (0, True), cut.how

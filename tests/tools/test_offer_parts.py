@@ -30,13 +30,11 @@ def plane(offset_mm: float, lean_deg: float = 0.0) -> Plane:
         (turned_by((20.0, 0.0, 0.0)), (plane(20.0),), False),
     ],
 )
-def test_an_alternative_that_a_person_sees_no_difference_to_is_like_another_one(
-    rotation: Floats, planes: tuple[Plane, ...], like: bool
-) -> None:
+def test_visually_equal_alternatives_are_duplicates(rotation: Floats, planes: tuple[Plane, ...], like: bool) -> None:
     assert offer_parts.Offer(UPRIGHT, (plane(20.0),)).is_like(offer_parts.Offer(rotation, planes), 60.0) is like
 
 
-def test_a_branch_is_offered_whole_and_cut_and_no_two_alternatives_are_alike() -> None:
+def test_a_branch_is_offered_whole_and_cut_without_duplicates() -> None:
     offers = offer_parts.offers_of(branch(), load(settings=["search.directions=60"]))
     assert {bool(offer.planes) for offer in offers} == {False, True}
     assert [offer.today for offer in offers] == [True] + [False] * (len(offers) - 1)

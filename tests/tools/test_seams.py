@@ -37,7 +37,7 @@ def test_nothing_is_left_on_the_rim_of_a_box_cut_askew(printed: tuple[tuple[str,
         (["G91", "G1 X0.5 E-0.2 F2100", "G0 X-0.5", "G90", "M83", "G1 E0.2"], ["wipe", "prime", "travel"]),
     ],
 )
-def test_what_is_planted_on_the_rim_is_counted(
+def test_a_planted_defect_on_the_rim_is_counted(
     printed: tuple[tuple[str, ...], Profile], planted: list[str], what: list[str]
 ) -> None:
     lines, profile = list(printed[0]), printed[1]

@@ -8,7 +8,9 @@ from tests import shapes
 from tools.campaigns.widths import Row, main
 
 
-def test_a_run_writes_one_line_a_search_and_goes_on_where_it_stopped(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_writes_one_line_per_search_and_continues_where_it_stopped(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     mesh, out = shapes.tee(), tmp_path / "out.csv"
     np.savez(tmp_path / "tee.npz", vertices=mesh.vertices.astype(np.float32), faces=mesh.faces)
     np.savez(tmp_path / "open.npz", vertices=mesh.vertices.astype(np.float32), faces=mesh.faces[5:])

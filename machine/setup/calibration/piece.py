@@ -71,7 +71,7 @@ class Piece:
         return np.array([pad.ways @ error for pad, error in zip(self.pads, errors, strict=True)])
 
     def slope(self) -> Floats:
-        """(pads x ways, UNKNOWN) derivative of the readings by the machine's numbers."""
+        """(pads x ways, UNKNOWN) derivatives of the readings with respect to the calibrated values of the machine."""
         return slope_of(lambda changes: _explained(self.machine, [self], changes), np.zeros(len(UNKNOWN)))
 
     def _error_mm(self, true: Machine, pad: Pad, pose: Pose) -> Floats:

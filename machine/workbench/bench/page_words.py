@@ -3,11 +3,14 @@
 A key is shown by its label, an option by the field that does the same.
 """
 
+import re
 from typing import Any
 
+from profiles.frozen import unit_of
 from profiles.messages import rendered
 from profiles.profile import label_of, labels
 
+NUMBER = re.compile(r"[+-]?\d+(\.\d*)?")
 # By the name of a mark. An option has two texts, without and with its value; a phrase has one.
 OPTIONS = {
     "--as-is": ("Undo", ""),
@@ -77,6 +80,7 @@ def _words(name: str, value: str, terminal: str) -> str:
     """The page's text for a mark, or the terminal's if the page has no such field."""
     if name.endswith("--set") and "=" in value:
         key, _, given = value.partition("=")
+        given = f"{100.0 * float(given):.12g} %" if unit_of(key) == "%" and NUMBER.fullmatch(given) else given
         return f"set {label_of(key)} to {given}" if name.startswith("advice") else f"{label_of(key)} = {given}"
     if name in OPTIONS:
         bare, with_value = OPTIONS[name]

@@ -130,11 +130,13 @@ def prices_of(session: SessionBase) -> Derived[dict[int, FrontRow]]:
 
 
 def price_by_hand(session: SessionBase) -> Derived[FrontRow | None]:
-    """The row of planes that the user has changed since they were found; None if they cannot be cut."""
+    """The row of planes that the user has changed since they were found, or that no search has priced; None if they cannot be
+    cut."""
 
     def decides(bench: Bench) -> tuple[object, ...] | None:
-        is_found = bench.cuts is None or any(planned_parts(row) == bench.cuts for row in bench.rows)
-        return None if is_found or not bench.rows else (bench.sought, bench.cuts, bench.locked)
+        found = next((row for row in bench.rows if planned_parts(row) == bench.cuts), None)
+        has_price = found is not None and (found.time_s is not None or not bench.priced)
+        return None if bench.cuts is None or has_price or not bench.rows else (bench.sought, bench.cuts, bench.locked)
 
     async def price(bench: Bench) -> FrontRow | None:
         await asyncio.sleep(REST_S)

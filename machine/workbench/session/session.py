@@ -131,6 +131,7 @@ class Session(SessionBase):
         if self.bench.model is not None and self.bench.model.faces > MANY_FACES:
             self.resting.stop()  # the new model would wait for it
         before = self.bench
+        self.close_gcode()
         with self.waiting(f"reading {name}"):
             bench = for_another_model(before) if anew else before
             model = await self._read(path, name, bench.profile, plate, asks=True)

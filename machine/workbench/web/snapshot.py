@@ -32,7 +32,7 @@ from mdp.search.trial import Trial
 from mdp.zone import AnyZone, Brushed, MeshVolume, Modifier, Zone
 from profiles.machine import Table
 from profiles.material import Material
-from profiles.messages import advice, keys_in, option, settings_in, terminal_words
+from profiles.messages import advice, keys_in, option, settings_in
 from profiles.places import OF_KIND
 from profiles.profile import Profile
 
@@ -310,7 +310,7 @@ def _resting(session: Session) -> list[dict[str, Any]]:
 
 def _words(steps: Sequence[Step]) -> list[str]:
     """The words of the last steps of a history, the latest first."""
-    return [terminal_words(step.word) for step in steps[::-1][:MOST_STEPS_LISTED]]
+    return [page_words(step.word) for step in steps[::-1][:MOST_STEPS_LISTED]]
 
 
 def _stop(stop: Stop) -> dict[str, str]:

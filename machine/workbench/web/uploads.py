@@ -22,6 +22,7 @@ from machine.workbench.session.keeping import OPEN_ELSEWHERE
 from machine.workbench.session.session import Session
 from machine.workbench.work.cutting import draw_kept
 from machine.workbench.work.folders import Received, folders_kept, remove_file
+from mdp.formats.readers import READERS
 from profiles.errors import PlanError, ProfileError, UserError, reason
 from profiles.files import lock_folder, modified_s, remove_locked
 from profiles.messages import check_text, option
@@ -187,6 +188,9 @@ class Uploads:
                     await session.open_project(path, name, taken_over)
                 elif path.suffix.lower() in GCODE_SUFFIXES:
                     await session.open_gcode(path, name)
+                elif path.suffix.lower() not in (TEXT_SUFFIX, *READERS):
+                    kinds = f"models ({', '.join(READERS)}), G-code ({', '.join(sorted(GCODE_SUFFIXES))})"
+                    raise PlanError(f"{name}: {kinds}, plans and profiles ({TEXT_SUFFIX}) can be opened")
                 elif path.suffix.lower() != TEXT_SUFFIX:
                     await session.open_model(path, name)
                     taken = True

@@ -144,7 +144,7 @@ def open_gcode(tell: Tell, request: ModelRequest, page: Path, gcode: Path) -> Sl
     program, profile = loaded.program, loaded.profile
     if not len(program.run.program.line):
         raise GcodeError(f"{request.name} holds no move: there is nothing to show")
-    drawn = print_page(request.name, program, profile, known=loaded.machine_known)
+    drawn = print_page(request.name, program, profile)  # tried for the workbench's machine, if the file names none
     content = ("\n".join(program.lines) + "\n").encode("utf-8", "replace")
     page.write_bytes(drawn)
     gcode.write_bytes(content)

@@ -93,7 +93,7 @@ STRANGERS: dict[str, tuple[Words, str]] = {
 
 
 @pytest.mark.parametrize("name", STRANGERS)
-def test_what_is_no_fitting_printer_is_refused_with_one_sentence(
+def test_a_printer_that_does_not_fit_is_refused_in_one_sentence(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     peer, sentence = STRANGERS[name]
@@ -106,7 +106,7 @@ def test_what_is_no_fitting_printer_is_refused_with_one_sentence(
 
 
 @pytest.mark.parametrize("rate", [230400, 1000000])
-def test_the_rate_at_which_the_printer_speaks_is_told(
+def test_the_baud_rate_of_the_printer_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, rate: int
 ) -> None:
     hear_out(monkeypatch, ports)
@@ -115,7 +115,7 @@ def test_the_rate_at_which_the_printer_speaks_is_told(
     assert f"does not speak at 115200 baud but at {rate}: use --baud {rate}" in capsys.readouterr().err
 
 
-def test_the_rate_is_found_behind_rfc_2217_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_baud_rate_is_found_over_rfc_2217_too(monkeypatch: pytest.MonkeyPatch) -> None:
     hear_out(monkeypatch, ports)
     with on_terminal(talking_at(230400)) as path, behind_rfc2217(path) as address, open_port(address, 115200) as port:
         answer, rate = ports.ask_at_any_rate(port, 115200)
@@ -204,7 +204,7 @@ def test_a_port_without_rights_names_the_group(
     assert f"{sentence} (sudo usermod -aG {group} $USER)" in capsys.readouterr().err
 
 
-def test_the_limits_that_the_firmware_tells_bind_the_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_limits_reported_by_the_firmware_apply_to_the_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     narrow = {**FIVE_AXES, "M115": FIVE_AXES["M115"].replace("i:-90.0", "i:-20.0")}
     with on_terminal(scripted(narrow)) as path:
         assert printed(path, file_of(tmp_path, "G0 Z100 F600", "G0 A-30 F600", "G0 A0")) == 1
@@ -233,7 +233,7 @@ def _machines() -> list[str]:
     return [name for name in shipped("machine") if name != "generic_ac"]
 
 
-def test_a_program_made_before_the_axes_were_measured_anew_is_refused() -> None:
+def test_a_program_made_before_a_new_calibration_is_refused() -> None:
     now = load(settings=["machine.tilt.point_mm=[0.0, 1.0, 2.5]"]).machine
     sentence = terminal_words(machine_mismatch(MACHINE, now, "part.gcode"))
     assert sentence.startswith(f"part.gcode was made when machine.tilt.point_mm of {MACHINE.name} was ")
@@ -246,7 +246,7 @@ def test_a_program_made_before_the_axes_were_measured_anew_is_refused() -> None:
     "turn.letter=B", "turn.stepper=s", "turn.axis=[0,0,-1]", "turn.point_mm=[1,2,3]", "turn.sign=1", "turn.zero_deg=3",
     "tool_mm=[0,0,1]", "dialect=klipper",
 ])  # fmt: skip
-def test_an_axis_that_lies_or_turns_otherwise_makes_another_machine(setting: str) -> None:
+def test_an_axis_with_another_direction_or_sign_makes_another_machine(setting: str) -> None:
     now = load(settings=[f"machine.{setting}"]).machine
     assert f"machine.{setting.partition('=')[0]} of" in terminal_words(machine_mismatch(MACHINE, now, "a.gcode"))
 
@@ -275,7 +275,7 @@ def test_a_board_that_starts_when_its_port_is_opened_is_waited_for() -> None:
         assert ask(port, PATIENCE_S).letters == "XYZAC"
 
 
-def test_limits_carry_the_firmware_s_own_letters() -> None:
+def test_limits_use_the_letters_of_the_firmware() -> None:
     with on_terminal(scripted(FIVE_AXES)) as path, open_port(path, 115200) as port:
         assert ask(port, PATIENCE_S).limits["A"] == (-90.0, 90.0)
 
@@ -291,18 +291,18 @@ def test_a_firmware_is_called_by_name_and_version(words: str, name: str) -> None
 
 
 @pytest.mark.parametrize("letters", ["", "XYZAC", "XYZABC"])
-def test_a_firmware_that_tells_enough_or_nothing_is_not_refused(letters: str) -> None:
+def test_a_firmware_that_reports_all_or_nothing_is_not_refused(letters: str) -> None:
     assert firmware_mismatch(Answer(Kind.PRINTER, "FIRMWARE_NAME:Marlin 2", letters), MACHINE) == ""
 
 
-def test_a_machine_whose_firmware_opens_files_itself_is_refused_at_a_port_whatever_answers() -> None:
+def test_a_machine_whose_firmware_runs_files_itself_is_refused_at_a_port() -> None:
     machine = load(machine="linuxcnc_xyzac").machine
     for refuse in (partial(check_machine, None), partial(check_destination, AT)):
         with pytest.raises(PrinterError, match="speaks linuxcnc, which opens files itself: use export"):
             refuse(machine=machine)
 
 
-def test_force_goes_past_another_firmware_and_says_so(capsys: pytest.CaptureFixture[str]) -> None:
+def test_force_overrides_another_firmware_with_a_note(capsys: pytest.CaptureFixture[str]) -> None:
     klipper = Identity("", Answer(Kind.PRINTER, "FIRMWARE_NAME:Klipper"))
     with pytest.raises(PrinterError, match="the printer's firmware is Klipper, but generic A/C table writes for marlin"):
         check_machine(klipper.printer, MACHINE)
@@ -338,7 +338,7 @@ def test_x_y_z_are_held_against_the_limits_where_they_are_places_of_the_axes(coo
     assert ("but the printer's firmware allows -5 to 5" in sentences) is refused
 
 
-def test_klipper_is_not_asked_for_letters_that_the_start_block_makes() -> None:
+def test_klipper_is_not_queried_for_axes_that_the_start_block_defines() -> None:
     machine = load(settings=["machine.dialect=klipper"]).machine
     assert firmware_mismatch(Answer(Kind.PRINTER, "FIRMWARE_NAME:Klipper", "XYZ"), machine) == ""
 

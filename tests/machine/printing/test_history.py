@@ -86,7 +86,7 @@ def test_a_print_that_fails_with_an_error_is_listed_as_failed() -> None:
     assert [(past["outcome"], past["seconds"]) for past in past_prints()] == [("failed", 90.0)]
 
 
-def test_a_print_that_goes_on_is_not_listed_and_one_that_was_killed_has_failed() -> None:
+def test_a_running_print_is_not_listed_and_a_killed_one_has_failed() -> None:
     def act() -> End:
         assert past_prints() == []
         return End(PrintState.LEFT)
@@ -110,7 +110,7 @@ def test_a_reader_that_holds_the_file_for_a_moment_does_not_leave_it_unlocked(mo
     assert printed("vase", act) is DONE
 
 
-def test_a_print_of_another_process_goes_on_until_that_ends(tmp_path: Path) -> None:
+def test_a_print_of_another_process_runs_until_that_ends(tmp_path: Path) -> None:
     program = """
 from machine.link.print_state import PrintState
 from machine.printing import history
@@ -127,7 +127,7 @@ input()
     assert [past["outcome"] for past in past_prints()] == ["failed"]
 
 
-def test_damaged_files_are_left_out_and_the_newest_prints_are_kept_and_those_that_go_on() -> None:
+def test_damaged_files_are_ignored_and_the_newest_and_running_prints_are_kept() -> None:
     printed("new", lambda: DONE)
     ended = json.dumps({"name": "old", "port": "sim", "begun": 1.0, "ended": 2.0, "outcome": "done"})
     for number in range(MOST_PRINTS + 9):

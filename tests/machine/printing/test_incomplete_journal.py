@@ -60,7 +60,7 @@ def resumed(printer: SimulatedPrinter, journal: Path, *options: str) -> int:
     return main(["resume", str(journal), "--port", printer.path, *(options or ["--yes"])])
 
 
-def test_after_a_power_cut_on_a_disk_that_had_filled_up_the_print_goes_on_in_its_part_and_pose(
+def test_after_a_power_cut_with_a_full_disk_the_print_resumes_in_its_part_and_pose(
     program: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     journal, lines = tmp_path / "disk" / "journal", program_of(900)  # enough for records beyond the last block of a file
@@ -100,7 +100,7 @@ DISKS = {
 
 
 @pytest.mark.parametrize("disk", DISKS)
-def test_a_print_whose_disk_fails_goes_on_tells_it_at_once_and_at_its_end_and_is_not_resumed_after_a_power_cut(
+def test_a_print_whose_disk_fails_continues_reports_that_and_is_not_resumed_later(
     program: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], disk: str
 ) -> None:
     journal = tmp_path / "journal"
@@ -119,7 +119,7 @@ def test_a_print_whose_disk_fails_goes_on_tells_it_at_once_and_at_its_end_and_is
     assert f"journal {journal} is incomplete" in refused
 
 
-def test_a_print_that_ends_well_tells_all_the_same_that_its_journal_was_lost(
+def test_a_successful_print_also_reports_that_its_journal_was_lost(
     program: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with SimulatedPrinter(MACHINE) as printer, pytest.MonkeyPatch.context() as monkeypatch:
@@ -153,7 +153,7 @@ def half_printed(program: Path, journal: Path, printer: SimulatedPrinter) -> int
 @pytest.mark.parametrize(("file", "number", "after"), [
     ("rest", errno.ENOSPC, 0), ("rest", errno.EIO, 3), ("journal", errno.EIO, 1),
 ])  # fmt: skip
-def test_nothing_moves_when_a_resumed_print_s_journals_cannot_be_written(
+def test_nothing_moves_when_the_journals_of_a_resumed_print_cannot_be_written(
     program: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], file: str, number: int, after: int
 ) -> None:
     journal, rest = tmp_path / "journal", tmp_path / "rest"
@@ -180,7 +180,7 @@ def test_a_journal_on_a_disk_that_is_read_only_now_is_not_resumed_for_it_could_b
     assert f"journal {journal} cannot be written: read-only file system" in capsys.readouterr().err.replace("\n", " ")
 
 
-def test_a_rest_whose_journal_fails_is_resumed_neither_from_the_new_journal_nor_from_the_old_one(
+def test_a_resumed_print_whose_journal_fails_cannot_be_resumed_from_either_journal(
     program: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     journal, rest = tmp_path / "journal", tmp_path / "rest"
@@ -196,7 +196,7 @@ def test_a_rest_whose_journal_fails_is_resumed_neither_from_the_new_journal_nor_
     assert f"journal {rest} is incomplete" in errors
 
 
-def test_after_a_restart_of_the_computer_a_person_must_look(
+def test_after_a_restart_of_the_computer_the_user_must_check(
     program: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     journal = tmp_path / "journal"
@@ -210,7 +210,7 @@ def test_after_a_restart_of_the_computer_a_person_must_look(
     assert "you must answer that question: resume at a terminal, without --yes" in errors
 
 
-def test_a_journal_on_a_disk_that_was_unmounted_in_mid_print_is_told(
+def test_a_journal_on_a_disk_unmounted_during_the_print_is_reported(
     program: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "disk"

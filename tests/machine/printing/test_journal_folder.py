@@ -105,7 +105,7 @@ def test_a_journal_is_not_offered_and_not_thinned_out_before_its_print_has_ended
     assert path in [str(entry.path) for entry in resumable_journals()]
 
 
-def test_a_program_whose_journal_another_process_has_yet_to_begin_is_not_thinned_out() -> None:
+def test_a_program_whose_journal_has_not_begun_yet_is_not_deleted() -> None:
     folder = state_folder() / "journals"
     folder.mkdir(exist_ok=True)
     begun, orphan = folder / "begun.journal.gcode", folder / "orphan.journal.gcode"
@@ -118,7 +118,7 @@ def test_a_program_whose_journal_another_process_has_yet_to_begin_is_not_thinned
     assert not orphan.exists()
 
 
-def test_a_program_that_a_journal_begun_meanwhile_names_is_not_thinned_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_program_named_by_a_new_journal_is_not_deleted(monkeypatch: pytest.MonkeyPatch) -> None:
     folder = state_folder() / "journals"
     for number in range(25):
         with new_journal(LINES, load(), f"{number}"):

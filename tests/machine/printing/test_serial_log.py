@@ -32,13 +32,13 @@ def test_chunks_become_whole_lines_in_the_order_of_their_ends(tmp_path: Path) ->
     assert logged(tmp_path / "a.log") == ["> N1 G28*18", "< ok N1", "> N2 G1 X1*99", "# paused"]
 
 
-def test_the_title_tells_what_was_printed_where(tmp_path: Path) -> None:
+def test_the_title_states_what_was_printed_where(tmp_path: Path) -> None:
     with SerialLog(tmp_path / "a.log", "tree.gcode to /dev/ttyACM0"):
         pass
     assert (tmp_path / "a.log").read_text().endswith(", tree.gcode to /dev/ttyACM0\n")
 
 
-def test_rubbish_is_written_so_that_every_byte_can_be_read(tmp_path: Path) -> None:
+def test_binary_data_is_logged_so_that_every_byte_can_be_read(tmp_path: Path) -> None:
     with SerialLog(tmp_path / "a.log", "") as log:
         log.note("<", b"\xff\x00ok\r\nwait")
     assert logged(tmp_path / "a.log") == [r"< \xff\x00ok", "< wait (unfinished)"]
@@ -64,7 +64,7 @@ def test_a_long_log_keeps_its_beginning_and_its_end(tmp_path: Path) -> None:
     assert pieces[-1].read_text().endswith("> N19999 G1 X1\n")
 
 
-def test_the_newest_ten_logs_are_kept_each_with_its_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_newest_ten_logs_are_kept_with_their_continuation_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
     files = []
     for _ in range(KEPT + 3):
@@ -79,7 +79,7 @@ def test_the_newest_ten_logs_are_kept_each_with_its_pieces(tmp_path: Path, monke
     assert names == sorted([console.file.name, *(p.name for f in files[3:] for p in (f, piece_of(f, 1)))])
 
 
-def test_a_log_that_cannot_be_written_says_so_and_stays_silent(tmp_path: Path) -> None:
+def test_a_log_that_cannot_be_written_is_reported_once(tmp_path: Path) -> None:
     with SerialLog(tmp_path / "nowhere" / "a.log", "") as log:
         log.note(">", b"G28\n")
     assert log.trouble == "no such file or directory"
@@ -121,11 +121,11 @@ def test_a_full_disk_ends_the_log_not_the_print() -> None:
     (b"Error:Heating failed", "Error:Heating failed"),
     (b"start", "the printer has started"),
 ])  # fmt: skip
-def test_of_what_the_printer_says_only_words_are_kept(line: bytes, text: str) -> None:
+def test_only_messages_of_the_printer_are_kept(line: bytes, text: str) -> None:
     assert printer_message(line) == text
 
 
-def test_words_cut_anywhere_are_put_together_and_the_last_four_kept() -> None:
+def test_messages_split_anywhere_are_joined_and_the_last_four_kept() -> None:
     messages, said = PrinterMessages(4), b"".join(b"ok\necho:word %d\n" % n for n in range(9))
     for at in range(0, len(said), 7):
         messages.hear("<", said[at : at + 7])
@@ -133,7 +133,7 @@ def test_words_cut_anywhere_are_put_together_and_the_last_four_kept() -> None:
     assert list(messages.last) == ["word 5", "word 6", "word 7", "word 8"]
 
 
-def test_a_message_that_stays_is_told_once_whatever_the_printer_says_meanwhile() -> None:
+def test_a_persistent_message_is_reported_once() -> None:
     messages = PrinterMessages()
     for text in ("pausing", "pausing", "", "paused"):
         messages.add(text)

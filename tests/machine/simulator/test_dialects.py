@@ -61,7 +61,7 @@ def test_reprapfirmware_s_fans_and_tools_are_understood() -> None:
     assert firmware.board.nozzle.at(firmware.board.now_s) == pytest.approx(200.0, abs=1.5)
 
 
-def test_a_stepper_nobody_has_is_said() -> None:
+def test_an_unknown_stepper_is_reported() -> None:
     assert "'z9' is not valid for STEPPER" in said(
         SimulatedFirmware(profile("klipper").machine), "MANUAL_STEPPER STEPPER=z9 MOVE=1"
     )

@@ -57,7 +57,7 @@ def test_answers_bytes_are_counted_apart_from_commands_bytes() -> None:
     assert answers(Fault("drop", 1, to_host=True)) == b"o\nok\nok\n"
 
 
-def test_garbage_among_bytes_goes_their_way() -> None:
+def test_garbage_is_inserted_in_the_direction_of_its_bytes() -> None:
     firmware = Heard()
     assert Cable(firmware, FaultScript((Fault("garbage", 2, unit="byte", text="xx"),))).exchange(b"G21\n") != b"ok\n"
     assert firmware.heard == b"G2xx1\n"
@@ -253,12 +253,12 @@ def test_a_cable_pulled_out_and_put_back_is_a_terminal_gone_and_back(tmp_path: P
     assert printer.record.lines == 2
 
 
-def test_what_is_no_link_is_not_replaced(tmp_path: Path) -> None:
+def test_a_file_that_is_not_a_link_is_not_replaced(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("x")
     with pytest.raises(PortError, match="mine exists and is not a link"), SimulatedPrinter(MACHINE, at=tmp_path / "mine"):
         pass
     assert (tmp_path / "mine").read_text() == "x"
 
 
-def test_seconds_last_for_ever_unless_told() -> None:
+def test_a_fault_given_in_seconds_lasts_unless_limited() -> None:
     assert Fault("stall", 1).seconds == inf

@@ -37,7 +37,7 @@ def resend(complaint: str, last: int) -> list[str]:
     ("N0 M110 N0*125\n", 1), ("M110 N0\n", 1), ("M110 N-1\n", 0), ("N-1 M110 N-1*125\n", 0), ("M110 N41\n", 42),
     ("N7 M110*36\n", 8),
 ])  # fmt: skip
-def test_line_numbers_begin_anew_in_every_way_that_hosts_write_it(line: str, following: int) -> None:
+def test_line_numbers_restart_in_every_notation_that_hosts_use(line: str, following: int) -> None:
     firmware = printer()
     assert answer(firmware, line) == ["ok"]
     assert answer(firmware, frame(following, "G21")) == ["ok"]
@@ -106,7 +106,7 @@ def test_lines_without_numbers_are_run_unchecked() -> None:
 # Answers
 
 
-def test_advanced_ok_tells_number_planner_and_queue_where_m105_and_plain_lines_tell_less() -> None:
+def test_advanced_ok_reports_number_planner_and_queue() -> None:
     firmware = printer(BuildOptions())
     moves = b"".join(frame(n, f"G1 X{n} F60") for n in range(1, 4))
     assert answer(firmware, moves, until_s=0.0) == ["ok N1 P14 B1", "ok N2 P13 B2", "ok N3 P12 B3"]
@@ -135,7 +135,7 @@ def test_m113_sets_how_often_busy_is_said() -> None:
     assert answer(firmware, "M113 S0\nG4 S99\n") == ["ok", "ok"]
 
 
-def test_a_wait_for_a_person_is_told_and_ended_by_m108() -> None:
+def test_a_wait_for_the_user_is_reported_and_ended_by_m108() -> None:
     firmware = printer()
     assert answer(firmware, "M0\n", until_s=3.0) == ["echo:busy: paused for user"]
     assert answer(firmware, "M108\n", until_s=3.0) == ["ok", "ok"]
@@ -155,12 +155,12 @@ def test_places_report_themselves_without_ok() -> None:
     assert [int(line.split("Count X:")[1].split()[0]) for line in said] == pytest.approx([160, 320], abs=12)
 
 
-def test_g28_and_g92_tell_the_place_unasked() -> None:
+def test_g28_and_g92_report_the_position_unasked() -> None:
     assert answer(printer(), "G92 X5\n")[0].startswith("X:5.00 Y:0.00 Z:0.00 A:0.00 C:0.00 E:0.00 Count X:0 ")
     assert answer(printer(), "G28\n")[-2].startswith("X:-160.00 Y:-160.00 ")
 
 
-def test_m115_tells_name_axes_capabilities_and_the_area_by_i_and_j() -> None:
+def test_m115_reports_name_axes_capabilities_and_the_area_by_i_and_j() -> None:
     said = answer(printer(BuildOptions(emergency_parser=False)), "M115\n")
     assert said[0].startswith("FIRMWARE_NAME:Marlin bugfix-2.1.x ")
     assert "AXIS_COUNT:5" in said[0]
@@ -169,7 +169,7 @@ def test_m115_tells_name_axes_capabilities_and_the_area_by_i_and_j() -> None:
     assert f"i:{MACHINE.tilt.limits_deg[0]:.2f},j:{MACHINE.turn.limits_deg[0]:.2f}}},max:{{" in said[-2]
 
 
-def test_a_machine_without_rotary_axes_says_so() -> None:
+def test_a_machine_without_rotary_axes_reports_that() -> None:
     said = answer(SimulatedFirmware(load(machine="three_axis").machine, PLAIN), "M115\nM114\n")
     assert "AXIS_COUNT:3" in said[0]
     assert "i:" not in "".join(said)
@@ -203,7 +203,7 @@ def test_progress_for_the_display_is_taken() -> None:
     assert answer(printer(), "M73 P50 R3\nM117 Part 1*2\n") == ["ok", "ok"]
 
 
-def test_a_reset_greets_and_begins_numbers_and_places_anew() -> None:
+def test_a_reset_greets_and_restarts_line_numbers_and_positions() -> None:
     firmware = printer()
     answer(firmware, frame(1, "G1 X5") + frame(2, "M104 S200"))
     firmware.reset()
@@ -223,7 +223,7 @@ def test_m112_is_read_from_the_raw_bytes_whatever_number_and_checksum_it_has(ord
     assert answer(firmware, "M105\nM115\n", until_s=99.0) == []
 
 
-def test_without_an_emergency_parser_m112_is_seen_when_the_queue_has_room_and_never_when_damaged() -> None:
+def test_without_an_emergency_parser_m112_waits_for_the_queue_and_must_be_undamaged() -> None:
     """Measured behind six G4 S2: 5.74 s."""
     firmware = printer(BuildOptions(advanced_ok=False, emergency_parser=False, busy=False))
     assert answer(firmware, "G4 S2\n" * 6 + "M112\n", until_s=5.9) == ["ok"] * 2
@@ -239,7 +239,7 @@ def test_without_an_emergency_parser_m108_ends_a_wait_for_heat_when_it_enters_th
     assert answer(firmware, "M108\n", until_s=5.0)[-2:] == ["ok", "ok"]
 
 
-def test_an_order_inside_a_line_is_none() -> None:
+def test_an_emergency_command_inside_a_line_is_ignored() -> None:
     assert answer(printer(), "M117 M112\nG1 X1 M410\nM1120\n")[-1] == "ok"
 
 
@@ -264,7 +264,7 @@ def test_soft_limits_clamp_without_a_word() -> None:
     assert (firmware.record().end[0, 3], firmware.record().clamped) == (MACHINE.tilt.limits_deg[1], 1)
 
 
-def test_m211_tells_and_lifts_the_soft_limits() -> None:
+def test_m211_reports_and_disables_the_soft_limits() -> None:
     firmware = printer()
     told = answer(firmware, "M211\n")
     assert told[0] == "  M211 S1 ; ON"
@@ -273,7 +273,7 @@ def test_m211_tells_and_lifts_the_soft_limits() -> None:
     assert firmware.record().end[-1, 0] == 161.0
 
 
-def test_settings_are_told_as_marlin_tells_them() -> None:
+def test_settings_are_reported_as_by_marlin() -> None:
     firmware = printer()
     answer(firmware, "M203 X250\n")
     assert answer(firmware, "M203\n") == ["  M203 X250.00 Y300.00 Z15.00 A30.00 C60.00 E60.00", "ok"]
@@ -289,7 +289,7 @@ def test_an_axis_driven_against_its_end_stays_there_unknown_to_the_firmware() ->
     assert firmware.board.motion.position[0] == 190.0
 
 
-def test_after_a_reset_the_axes_stand_where_they_stood() -> None:
+def test_after_a_reset_the_axes_are_where_they_were() -> None:
     firmware = printer()
     answer(firmware, "G1 X50\nM400\n")
     firmware.reset()
@@ -304,7 +304,7 @@ def test_cold_filament_stays_and_the_move_is_made() -> None:
     assert firmware.record().end[:, [0, 5]].tolist() == [[1.0, 0.0], [2.0, 1.0]]
 
 
-def test_m114_tells_where_the_program_will_be_and_count_where_the_axes_are() -> None:
+def test_m114_reports_the_planned_position_and_count_the_actual_one() -> None:
     firmware = printer()
     answer(firmware, "G1 X60 F600\nG1 Z1\nG1 A9\n", until_s=3.0)
     said = answer(firmware, "M114\n", until_s=3.0)[0]
@@ -321,7 +321,7 @@ def test_feed_and_flow_overrides_act() -> None:
     assert answer(firmware, "M220\nM221\n") == ["FR:50%", "ok", "echo:E0 Flow: 90%", "ok"]
 
 
-def test_speeds_accelerations_and_corners_can_be_told() -> None:
+def test_speeds_accelerations_and_corners_can_be_set() -> None:
     firmware = printer()
     answer(firmware, "G1 X100 F60000\nM400\nM203 X10\nG1 X0\nM400\nM203 X100\nM201 X100\nG1 X100\nM400\n")
     fast, slow, lazy = firmware.record().duration_s
@@ -337,7 +337,7 @@ def test_endstops_are_touched_after_homing() -> None:
     assert answer(firmware, "M119\n")[1:4] == ["x_min: TRIGGERED", "y_min: TRIGGERED", "z_max: TRIGGERED"]
 
 
-def test_homing_takes_as_long_as_the_way() -> None:
+def test_homing_takes_as_long_as_its_distance() -> None:
     firmware = printer()
     answer(firmware, "G28\nG1 X100 F9000\nM400\n")
     began_s = firmware.board.now_s
@@ -366,7 +366,7 @@ def test_a_heater_that_fails_in_the_print_is_a_thermal_runaway() -> None:
     assert firmware.record().nozzle_target_c == 0.0
 
 
-def test_a_failed_heater_that_is_off_harms_nobody() -> None:
+def test_a_failed_heater_that_is_off_causes_no_error() -> None:
     firmware = printer()
     firmware.board.bed.fail(0.0)
     assert answer(firmware, "G4 S500\n")[-1] == "ok"

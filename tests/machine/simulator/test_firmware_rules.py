@@ -60,14 +60,14 @@ def test_klipper_reads_neither_numbers_nor_checksums(line: bytes) -> None:
     assert firmware.record().end[-1, 0] == 5.0
 
 
-def test_klipper_s_errors_are_followed_by_ok_and_the_stream_goes_on() -> None:
+def test_errors_of_klipper_are_followed_by_ok_and_the_stream_continues() -> None:
     firmware = SimulatedFirmware(KLIPPER)
     assert answer(firmware, "G1 X999\nG1 X5\n") == ["!! Move out of range: 999.000 0.000 0.000 [0.000]", "ok", "ok"]
     assert answer(firmware, "M83\nG1 X6 E1\n")[-2:] == ["!! Extrude below minimum temp", "ok"]
     assert firmware.record().end[:, 0].tolist() == [5.0]
 
 
-def test_klipper_names_itself_behind_its_ok_and_tells_the_bed_first() -> None:
+def test_klipper_names_itself_after_its_ok_and_reports_the_bed_first() -> None:
     firmware = SimulatedFirmware(KLIPPER)
     assert answer(firmware, "M115\n")[0].startswith("ok FIRMWARE_NAME:Klipper FIRMWARE_VERSION:v0.13")
     assert answer(firmware, "M105\nM114\n") == ["ok B:20.0 /0.0 T0:20.0 /0.0", "X:0.000 Y:0.000 Z:0.000 E:0.000", "ok"]
@@ -104,7 +104,7 @@ def test_the_terminal_s_back_pressure_reaches_the_host() -> None:
     assert refused
 
 
-def test_klipper_sees_m112_out_of_order_and_tells_the_reason_to_what_waits_behind_it() -> None:
+def test_klipper_executes_m112_out_of_order_and_answers_queued_lines_with_the_reason() -> None:
     """klippy/gcode.py: _process_data searches for M112 before it processes; _respond_state, then _respond_error for the next."""
     firmware = SimulatedFirmware(KLIPPER)
     answer(firmware, "G4 S50\nG1 X5\n", until_s=1.0)
@@ -133,13 +133,13 @@ def test_klipper_names_a_heater_s_failure_to_the_next_command_only() -> None:
     (RRF, "M777", "Warning: M777: Command is not supported"),
     (KLIPPER, "M155 S2", '// Unknown command:"M155 S2"'),
 ])  # fmt: skip
-def test_each_family_has_its_own_words_for_what_it_does_not_know(machine, line: str, said: str) -> None:  # type: ignore[no-untyped-def]
+def test_each_family_has_its_own_words_for_unknown_commands(machine, line: str, said: str) -> None:  # type: ignore[no-untyped-def]
     firmware = SimulatedFirmware(machine)
     assert said in answer(firmware, f"{line}\n")
     assert firmware.record().unknown == 1
 
 
-def test_reprapfirmware_tells_places_steps_and_machine_coordinates() -> None:
+def test_reprapfirmware_reports_positions_steps_and_machine_coordinates() -> None:
     said = answer(SimulatedFirmware(RRF), "G92 X5\nM114\n")
     assert said[:2] == ["ok", "X:5.000 Y:0.000 Z:0.000 A:0.000 C:0.000 E:0.000 E0:0.0 Count 0 0 0 0 0 "
                         "Machine 5.000 0.000 0.000 0.000 0.000 Bed comp 0.000"]  # fmt: skip
@@ -190,7 +190,7 @@ def test_m84_with_an_idle_time_of_0_keeps_marlin_s_motors_on() -> None:
     assert not happened(firmware.record(), "motors off")
 
 
-def test_klipper_shuts_down_after_ten_idle_minutes_and_moves_nothing_any_more() -> None:
+def test_klipper_shuts_down_after_ten_idle_minutes_and_then_moves_nothing() -> None:
     """klippy/extras/idle_timeout.py: TURN_OFF_HEATERS, M84; a dwell restarts the timeout, M105 and M400 do not."""
     firmware = SimulatedFirmware(KLIPPER)
     answer(firmware, "G28\nM104 S200\nG1 X5\nM400\n")

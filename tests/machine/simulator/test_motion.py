@@ -19,12 +19,12 @@ TRAVEL = {"X": 20.0, "F": 60000.0}
 
 
 @pytest.mark.parametrize("limits", [{"P": 500.0}, {"S": 500.0}, {"P": 500.0, "T": 1000.0}])
-def test_a_stroke_is_accelerated_as_m204_p_tells(limits: dict[str, float]) -> None:
+def test_a_stroke_is_accelerated_as_set_by_m204_p(limits: dict[str, float]) -> None:
     assert _seconds(STROKE, limits) == pytest.approx(2 * sqrt(20 / 500))
 
 
 @pytest.mark.parametrize("limits", [{"T": 500.0}, {"S": 500.0}, {"P": 1000.0, "T": 500.0}])
-def test_a_travel_is_accelerated_as_m204_t_tells(limits: dict[str, float]) -> None:
+def test_a_travel_is_accelerated_as_set_by_m204_t(limits: dict[str, float]) -> None:
     assert _seconds(TRAVEL, limits) == pytest.approx(2 * sqrt(20 / 500))
 
 

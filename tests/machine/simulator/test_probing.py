@@ -36,7 +36,7 @@ def test_klipper_says_where_the_bed_is() -> None:
     assert "// Result: at 20.000,0.000 estimate contact at z=55.000000" in says("fractal5pro", "PROBE PROBE_SPEED=3.0 SAMPLES=1")
 
 
-def test_klipper_goes_on_to_its_end_and_says_that_nothing_was_met() -> None:
+def test_klipper_probes_to_the_end_of_its_travel_and_reports_no_contact() -> None:
     answers = says("fractal5pro", "PROBE", "M114", silent_from=1)
     assert "!! No trigger on probe after full movement" in answers
     assert any("Z:-150.000" in line for line in answers)

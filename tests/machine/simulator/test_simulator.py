@@ -47,7 +47,7 @@ def test_ok_is_withheld_while_fifteen_blocks_are_planned() -> None:
     assert len(answer(firmware, "", until_s=2.5)) in (2, 3)
 
 
-def test_waiting_for_heat_tells_temperatures_every_second_until_they_are_reached() -> None:
+def test_waiting_for_heat_reports_temperatures_every_second_until_they_are_reached() -> None:
     firmware = printer()
     *reports, last = answer(firmware, "M109 S200\n")
     assert last == "ok"
@@ -63,7 +63,7 @@ def test_after_kill_there_is_silence_until_reset() -> None:
     assert answer(firmware, "M110 N0\n")[0] == "start"
 
 
-def test_m410_cuts_the_move_under_way_and_drops_the_rest() -> None:
+def test_m410_ends_the_current_move_and_drops_the_rest() -> None:
     firmware = printer()
     answer(firmware, "G1 X10 F60\nG1 X20\nG1 X30\n", until_s=5.0)
     answer(firmware, "M410\n", until_s=5.0)
@@ -71,7 +71,7 @@ def test_m410_cuts_the_move_under_way_and_drops_the_rest() -> None:
     assert answer(firmware, "M114\n", until_s=6.0)[0].startswith(f"X:{firmware.record().end[-1, 0]:.2f} ")
 
 
-def test_m114_and_g92_tell_all_axes() -> None:
+def test_m114_and_g92_report_all_axes() -> None:
     said = answer(printer(), "G92 X1 A-30 C725 E2\nM114\n")
     assert said[0] == said[2]
     assert said[0].startswith("X:1.00 Y:0.00 Z:0.00 A:-30.00 C:725.00 E:2.00 Count X:0 ")
@@ -138,7 +138,7 @@ def test_moves_take_as_long_as_a_trapezoid_does(command: str, seconds: float | N
 
 
 @given(st.floats(30, 290), st.floats(21, 29))
-def test_a_heater_is_at_a_temperature_when_it_says_so(target: float, early: float) -> None:
+def test_a_heater_is_at_a_temperature_when_it_reports_that(target: float, early: float) -> None:
     heater = Heater("nozzle", 300.0, 60.0)
     heater.set(target, 0.0)
     assert heater.at(heater.reaches(early)) == pytest.approx(early)
@@ -147,7 +147,7 @@ def test_a_heater_is_at_a_temperature_when_it_says_so(target: float, early: floa
     assert heater.reaches(target + 5) == inf
 
 
-def test_deposited_plastic_lies_on_the_workpiece_however_the_table_stands() -> None:
+def test_deposited_plastic_is_on_the_workpiece_in_every_pose_of_the_table() -> None:
     record = ran(HOT + "M83\nG0 A90 Y10\nG1 X10 E1\nG1 E1\nG1 X20\nG1 C90 E2\n").record()
     segments, volumes = record.deposited(1.75)
     assert volumes == pytest.approx([pi / 4 * 1.75**2, pi / 2 * 1.75**2])

@@ -59,7 +59,7 @@ def test_bytes_arrive_one_after_the_other() -> None:
     assert heard == [b"", b"", b"", b"", b"", b"", b"o", b"k", b"\n", b""]
 
 
-def test_what_happens_does_not_depend_on_how_often_it_is_looked_at() -> None:
+def test_the_simulation_does_not_depend_on_how_often_it_is_polled() -> None:
     said = []
     for steps in (1, 7, 1000):
         _, line = uart(115200, BuildOptions(rx_ring=128))

@@ -89,7 +89,7 @@ def test_only_a_served_page_may_ask_its_server() -> None:
     assert policy(shown(live=True)[1])["connect-src"] == "'self'"
 
 
-def test_nothing_is_fetched_and_nothing_stands_in_attributes() -> None:
+def test_nothing_is_fetched_and_no_script_is_in_attributes() -> None:
     content, elements = shown()
     for tag, attrs in elements.tags:
         assert not [name for name in attrs if name.startswith("on") or name in ("src", "srcset", "style", "action", "formaction")]
@@ -128,7 +128,7 @@ def test_a_machine_that_is_named_is_known(folder: Path) -> None:
     assert opened(Path("a.html").read_bytes())[0]["machine"]["known"] is True
 
 
-def test_view_does_not_write_over_a_page_that_is_not_its_own(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_view_does_not_overwrite_a_page_of_another_program(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("moves.gcode").write_text(MOVES)
     Path("moves.html").write_text("<p>my notes")
     assert main(["view", "moves.gcode"]) == 1
@@ -146,7 +146,7 @@ def test_view_does_not_write_over_a_page_that_is_not_its_own(folder: Path, capsy
         ("model.stl", "solid nothing", "model.stl"),
     ],
 )
-def test_what_cannot_be_shown_is_one_sentence(
+def test_a_file_that_cannot_be_shown_is_refused_in_one_sentence(
     folder: Path, capsys: pytest.CaptureFixture[str], name: str, text: str, said: str
 ) -> None:
     Path(name).write_text(text)
@@ -179,7 +179,7 @@ def test_open_shows_the_page_in_the_browser(folder: Path, monkeypatch: pytest.Mo
     assert asked == [(folder / "moves.html").resolve().as_uri()]
 
 
-def test_a_model_with_a_nasty_name_goes_all_the_way(folder: Path) -> None:
+def test_a_model_name_with_markup_is_escaped_everywhere(folder: Path) -> None:
     name = "<img onerror=alert(1)>.stl"
     Path(name).write_bytes(stl(tee()))
     assert main(["decompose", name, *COARSE, "--html", "a.html"]) == 0
@@ -197,7 +197,7 @@ def test_export_writes_the_page_of_its_own_file(folder: Path) -> None:
     assert [lines[int(line) - 1][0] for line in arrays["line"][::100]] == ["G"] * len(arrays["line"][::100])
 
 
-def test_the_packed_report_tells_the_changed_settings_first(folder: Path) -> None:
+def test_the_packed_report_lists_changed_settings_first(folder: Path) -> None:
     Path("tee.stl").write_bytes(stl(tee()))
     assert main(["decompose", "tee.stl", *COARSE, "--html", "a.html"]) == 0
     report = opened(Path("a.html").read_bytes())[0]["report"]
@@ -209,7 +209,7 @@ def test_the_packed_report_tells_the_changed_settings_first(folder: Path) -> Non
     assert (tables["All settings"]["folded"], tables["Parts"]["folded"]) == (True, False)
 
 
-def test_another_machine_is_held_against_its_own_shipped_values() -> None:
+def test_another_machine_is_compared_with_its_shipped_values() -> None:
     from machine.view.report import settings_tables
 
     profile = load(machine="fractal5pro", settings=["machine.clearance_mm=3"])
@@ -268,7 +268,7 @@ def test_a_script_imports_what_the_others_export_and_uses_it(script: Path) -> No
         assert [name for name in names.split(", ") if name not in body] == []
 
 
-def test_every_script_has_a_name_of_its_own_and_is_part_of_a_page() -> None:
+def test_every_script_has_a_unique_name_and_is_part_of_a_page() -> None:
     assert len({(file.parent.name, file.stem) for file in SCRIPTS}) == len(SCRIPTS)
     pages = bundle(TEMPLATE / "main.js") + bundle(OWN / "main.js")
     assert [file for file in SCRIPTS if f'modules["{file.parent.name}/{file.stem}"] = ' not in pages] == []

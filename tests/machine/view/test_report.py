@@ -47,7 +47,7 @@ def test_times_and_material_of_all_kinds_are_the_whole_print() -> None:
     assert {row[0] for row in rows} >= {"External perimeter", "Perimeter", "travel", "turning the table"}
 
 
-def test_waiting_is_a_kind_of_its_own() -> None:
+def test_waiting_is_a_separate_kind() -> None:
     rows = {row[0]: row for row in of_text("G28\nG1 X60 F3600\nG4 S5\nG1 X0\nG1 X9 E1")["Time and material"]["rows"]}
     assert rows["waiting"][1] == "5s"
     assert set(rows) == {"unknown", "travel", "waiting"}
@@ -60,7 +60,7 @@ def test_each_part_has_its_shape_its_layers_and_its_time() -> None:
     assert table["rows"][1][3:7] == ["1.00", "100", "0.0", "3"]
 
 
-def test_a_file_without_parts_and_layers_is_told_as_a_whole() -> None:
+def test_a_file_without_parts_and_layers_is_reported_as_a_whole() -> None:
     report = of_text(STEPS.replace(";LAYER_CHANGE", ""))
     assert report["facts"]["layers"] == "5, by their heights"
     assert "parts" not in report["facts"]
@@ -86,7 +86,7 @@ def test_areas_are_compared_at_no_cost_and_alternatives_where_they_are_known() -
     assert known["notes"] == ["straight up: too high"]
 
 
-def test_joints_of_a_sliced_model_tell_contact_and_plastic_those_of_g_code_nothing_else() -> None:
+def test_joints_of_a_sliced_model_have_contact_and_plastic_those_of_g_code_only_these() -> None:
     profile, program = example()
     (face,) = program.run.interfaces
     laid = [f"{100 * face.contact:.1f}", f"{100 * face.over_room:.0f}"]
@@ -99,7 +99,7 @@ def test_joints_of_a_sliced_model_tell_contact_and_plastic_those_of_g_code_nothi
     assert (alone["head"], alone["rows"]) == (["part", "mm²", *LAID], [["2", f"{face.area_mm2:.1f}", *laid]])
 
 
-def test_parts_alone_tell_only_what_is_known_of_their_joints_unless_they_were_sliced_to_compare() -> None:
+def test_unsliced_parts_have_no_contact_figures_unless_sliced_for_a_comparison() -> None:
     profile, program = example()
     assert program.decomposition is not None
     bare, sliced = joints_of(program.decomposition.parts, profile), joints_of_print(program, profile)
@@ -130,7 +130,7 @@ def test_every_row_is_as_long_as_its_head_and_all_is_text() -> None:
         assert all(len(row) == len(table["head"]) and all(isinstance(cell, str) for cell in row) for row in table["rows"])
 
 
-def test_of_a_file_that_does_not_tell_its_machine_nothing_is_pretended() -> None:
+def test_no_settings_are_listed_for_a_file_without_a_machine() -> None:
     profile, program = example()
     report = print_report(program, profile, *sums_of(program.run), known=False, ours=False)
     assert dict(report["facts"])["machine"].startswith("unknown")

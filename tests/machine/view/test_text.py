@@ -39,7 +39,7 @@ def test_the_text_of_another_slicer_is_in_the_page_and_its_numbers_are_not() -> 
     assert header["text"]["zeros"] == [[9, 1151000]]
 
 
-def test_a_text_whose_lines_are_all_unlike_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_text_whose_lines_are_all_different_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(text, "MOST_LETTERS", 40)
     header, columns = read(FOREIGN)
     assert (header["text"], header["lines"], len(columns["text"])) == (None, 15, 0)
@@ -47,7 +47,7 @@ def test_a_text_whose_lines_are_all_unlike_is_left_out(monkeypatch: pytest.Monke
 
 
 @given(st.lists(st.tuples(st.sampled_from("XYZE"), st.from_regex(r"-?0?[0-9]{0,3}\.?[0-9]{0,6}", fullmatch=True)), max_size=6))
-def test_whatever_a_line_looks_like_it_is_read_back_letter_for_letter(words: list[tuple[str, str]]) -> None:
+def test_any_line_is_read_back_exactly(words: list[tuple[str, str]]) -> None:
     line = " ".join(letter + number for letter, number in words)
     rows = {"line": Column(np.array([2]), "i32"), "end": Column(np.array([[1.5, 0.0, -0.25]]), "i32", 0.001)}
     packed_text, columns = text.line_patterns(("G92 E1", f"G1 {line}"), rows | {"filament": Column(np.array([0.5]), "f64", 1e-5)})

@@ -94,7 +94,7 @@ def test_waiting_counts_before_the_move_that_follows_it() -> None:
     assert header["time_s"] == pytest.approx(columns["time"][1] + 2.0, abs=0.001)
 
 
-def test_a_row_tells_its_kind_bead_heat_and_fan() -> None:
+def test_a_row_has_its_kind_bead_temperatures_and_fan() -> None:
     _, columns = read(
         "G28\nM104 S200\nM140 S60\nM106 S51\nG0 X5\n;WIDTH:0.5\n;HEIGHT:0.25\nG1 X9 E1 F600\nG1 X8 E0\nM107\nG1 E-1\nG1 E0"
     )
@@ -133,7 +133,7 @@ def test_a_fan_without_a_number_blows_fully_and_shares_may_go_to_one() -> None:
 STEPS = "\n".join(f";LAYER_CHANGE\nG0 X0 Z{0.2 * k:.1f}\nG1 X20 E{k}\nG1 Y9\nG1 Y0 X0 E{k}.5" for k in range(1, 6))
 
 
-def test_layers_that_are_not_told_come_from_the_heights() -> None:
+def test_layers_without_comments_follow_from_the_heights() -> None:
     commented, silent = read(STEPS), read(STEPS.replace(";LAYER_CHANGE", ""))
     assert [header["layers_by"] for header, _ in (commented, silent)] == ["comments", "heights"]
     np.testing.assert_allclose(commented[1]["layer_z"], [0.2, 0.4, 0.6, 0.8, 1.0], atol=1e-6)
@@ -159,7 +159,7 @@ def test_a_helix_has_a_layer_a_turn() -> None:
     assert layers_of(parse_gcode(lines, PLAIN.machine), 0.2).rows.tolist() == [8, 8, 8, 8, 8]
 
 
-def test_parts_are_told_with_pose_time_and_their_place_in_the_rows() -> None:
+def test_parts_have_their_pose_time_and_rows() -> None:
     _, program = example()
     header, columns = shown()
     assert [part["index"] for part in header["parts"]] == [1, 2]
@@ -200,7 +200,7 @@ def test_a_foot_is_covered_by_its_disc() -> None:
     assert base["radius_mm"] == pytest.approx(np.hypot(5, 5))
 
 
-def test_the_front_is_told_whole_with_its_planes_in_print_order() -> None:
+def test_the_front_is_complete_with_planes_in_print_order() -> None:
     side, top = (Plane(np.array(normal), 5.0) for normal in ((1.0, 0.0, 0.0), (0.0, 0.0, 1.0)))
     front = (
         FrontRow((), 100.0, 0.0, 100.0, time_s=60.0, filament_mm=1000.0),
@@ -218,7 +218,7 @@ def test_the_front_is_told_whole_with_its_planes_in_print_order() -> None:
     assert more["command"] == "tiltprint decompose 'the arm.stl' --parts 3"
 
 
-def test_a_finding_stands_at_its_line() -> None:
+def test_a_finding_is_at_its_line() -> None:
     header, columns = read("G28\nG1 X10 F600\nG1 X9999\nG1 X10")
     mistake = next(finding for finding in header["findings"] if finding["severity"] == "error")
     assert (mistake["line"], mistake["row"]) == (3, 1)
@@ -234,14 +234,14 @@ def test_a_finding_names_settings_by_their_labels_and_keeps_their_keys() -> None
     assert guess["keys"] == "machine.table, machine.tilt.point_mm"
 
 
-def test_a_finding_about_another_layer_stands_where_that_begins() -> None:
+def test_a_finding_about_another_layer_is_at_its_beginning() -> None:
     text = ";PART:1\n;UNSUPPORTED:3@2\n;LAYER_CHANGE\nG1 Z0.2 F600\nG1 X9 E1\n;LAYER_CHANGE\nG0 Z0.4\nG1 X0 E2"
     header, columns = read(text)
     (unsupported,) = [finding for finding in header["findings"] if finding["code"] == "unsupported"]
     assert (unsupported["line"], unsupported["layer"], columns["line"][unsupported["row"]]) == (2, 2, 8)
 
 
-def test_a_guessed_machine_finds_nothing_of_its_own() -> None:
+def test_a_guessed_machine_adds_no_findings() -> None:
     text = "G28\nG1 Z0.2 F600\nG1 X9999\nG1 X0 E1"
     lines = tuple(text.split("\n"))
     codes = [
@@ -281,7 +281,7 @@ def test_thinning_keeps_the_ends_of_strokes_and_every_other_move() -> None:
     assert set(corners.tolist()) <= set(rows.tolist())
 
 
-def test_what_is_kept_stays_exact(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_rows_that_are_kept_stay_exact(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("machine.view.paths.shown_rows", lambda program: shown_rows(program, most=500))
     program = parse_gcode(WAVE.split("\n"), PLAIN.machine)
     header, columns = read(WAVE)
@@ -293,7 +293,7 @@ def test_what_is_kept_stays_exact(monkeypatch: pytest.MonkeyPatch) -> None:
     assert columns["time"][-1] == pytest.approx(header["time_s"], abs=0.001)
 
 
-def test_nothing_is_thinned_that_fits() -> None:
+def test_a_print_that_fits_is_not_thinned() -> None:
     program = parse_gcode(WAVE.split("\n"), PLAIN.machine)
     assert len(shown_rows(program)) == len(program.line)
 
@@ -307,7 +307,7 @@ LINES = (
 
 @settings(max_examples=50)
 @given(st.lists(st.sampled_from(LINES), max_size=25))
-def test_whatever_the_order_of_lines_rows_layers_and_parts_fit_together(lines: list[str]) -> None:
+def test_rows_layers_and_parts_agree_for_any_order_of_lines(lines: list[str]) -> None:
     header, columns = read("\n".join(lines))
     parsed = parse_gcode(lines, PLAIN.machine)
     rows = len(parsed.line)

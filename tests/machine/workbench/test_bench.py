@@ -28,7 +28,7 @@ def history(bench: Bench | None = None) -> History:
     return History(Step("", bench or Bench(PROFILE, model())))
 
 
-def test_a_quarter_turn_is_exact_and_four_of_them_are_none() -> None:
+def test_a_quarter_turn_is_exact_and_four_of_them_are_the_identity() -> None:
     turned = history()
     for _ in range(3):
         turned = changed(turned, "turn", axis="x", deg=90)
@@ -45,7 +45,7 @@ def test_a_face_that_is_laid_down_looks_down() -> None:
         assert np.linalg.det(rotation) == pytest.approx(1.0)
 
 
-def test_one_copy_is_a_number_of_copies_and_none_is_not() -> None:
+def test_one_copy_is_allowed_and_zero_copies_are_not() -> None:
     three = changed(history(), "copies", count=3)
     assert [steps.now.bench.copies for steps in (three, changed(three, "copies", count=1))] == [3, 1]
     with pytest.raises(PlanError, match="is 0: 1 to 1000 is allowed"):
@@ -73,7 +73,7 @@ def test_steps_back_end_where_their_models_would_fill_the_memory(monkeypatch: py
     assert [step.word for step in now.before][:2] == ["open d", "find parts of d"]
 
 
-def test_what_changes_nothing_is_no_step() -> None:
+def test_a_command_that_changes_nothing_adds_no_step() -> None:
     searched = history().do("find parts", with_front(history().now.bench, FRONT))
     assert changed(searched, "take", parts=3) is searched
     assert changed(history(), "turn", axis="y", deg=0).before == ()
@@ -101,7 +101,7 @@ def test_a_plan_has_the_planes_in_print_order() -> None:
         ("take", {"parts": 3}, "parts is 3"),
     ],
 )
-def test_what_cannot_be_done_is_one_sentence(change: str, asked: dict[str, Any], said: str) -> None:
+def test_an_impossible_command_is_refused_in_one_sentence(change: str, asked: dict[str, Any], said: str) -> None:
     with pytest.raises(PlanError, match=said):
         changed(history(), change, **asked)
 

@@ -28,7 +28,7 @@ def change(bench: Running, path: str, method: str) -> tuple[int, bytes]:
     return bench.ask(above(bench, path), method, Origin=f"http://127.0.0.1:{bench.port}")
 
 
-def test_a_second_model_lies_on_a_bench_of_its_own_that_is_closed_with_its_processes(bench: Running, tmp_path: Path) -> None:
+def test_a_second_model_has_its_own_bench_that_is_closed_with_its_processes(bench: Running, tmp_path: Path) -> None:
     bench.send(_file(tmp_path, "first.stl"))
     with bench.line() as page:
         page.do("set", key="process.walls", value="5")

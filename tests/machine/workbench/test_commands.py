@@ -62,12 +62,12 @@ def test_only_what_is_sliced_is_compared() -> None:
 
 
 @pytest.mark.parametrize("name", ["dance", ["turn"], None, "refuse"])
-def test_what_is_no_command_is_told_to_be_none(name: Any) -> None:
+def test_an_unknown_command_is_refused(name: Any) -> None:
     with pytest.raises(PlanError, match=r"no(t a)? command: docs/workbench-protocol.md lists them"):
         obey(bare(Bench(load(), model())), {"do": name})
 
 
-def test_the_page_knows_the_very_same_names() -> None:
+def test_the_page_uses_exactly_the_names_of_the_server() -> None:
     page = "".join(file.read_text("utf-8") for file in PAGE.rglob("*") if file.name.endswith((".js", ".html")))
     said = {
         word

@@ -60,7 +60,7 @@ def run(work: Callable[[], Coroutine[Any, Any, None]]) -> None:
 
 
 @pytest.mark.parametrize("interrupts", [False, True])
-def test_the_newest_key_is_worked_out_and_what_was_begun_for_others_is_dropped(interrupts: bool) -> None:
+def test_the_newest_key_is_computed_and_tasks_for_others_are_dropped(interrupts: bool) -> None:
     async def work() -> None:
         copies = Copies(interrupts=interrupts)
         await copies.become(2)
@@ -75,7 +75,7 @@ def test_the_newest_key_is_worked_out_and_what_was_begun_for_others_is_dropped(i
     run(work)
 
 
-def test_nothing_is_worked_out_without_a_key_and_nothing_is_held_of_another_bench() -> None:
+def test_nothing_is_computed_without_a_key_and_no_other_bench_is_held() -> None:
     async def work() -> None:
         copies = Copies()
         await copies.become(2)
@@ -88,7 +88,7 @@ def test_nothing_is_worked_out_without_a_key_and_nothing_is_held_of_another_benc
     run(work)
 
 
-def test_what_fails_is_told_and_begun_again_only_for_another_key() -> None:
+def test_a_failure_is_reported_and_repeated_only_for_another_key() -> None:
     async def work() -> None:
         copies = Copies()
         await copies.become(13)
@@ -103,7 +103,7 @@ def test_what_fails_is_told_and_begun_again_only_for_another_key() -> None:
     run(work)
 
 
-def test_one_that_is_asked_for_is_worked_out_once_for_all_and_raises_what_its_task_raises() -> None:
+def test_a_value_on_demand_is_computed_once_for_all_callers_and_raises_its_error() -> None:
     async def work() -> None:
         copies = Copies(by_itself=False)
         await copies.become(2)
@@ -183,7 +183,7 @@ def test_commands_are_executed_one_at_a_time_in_the_order_in_which_they_come_als
     run(work)
 
 
-def test_who_waits_for_a_value_is_refused_when_the_bench_is_closed() -> None:
+def test_a_caller_waiting_for_a_value_is_refused_when_the_bench_is_closed() -> None:
     async def close_meanwhile() -> None:
         copies = Copies(by_itself=False)
         copies.session.history = replace(
@@ -201,9 +201,7 @@ def test_who_waits_for_a_value_is_refused_when_the_bench_is_closed() -> None:
 
 
 @pytest.mark.parametrize("setting", ["process.raft_layers=3", "process.complete_objects=true", "process.skirt_loops=3"])
-def test_how_copies_stand_is_worked_out_again_for_what_decides_their_places(
-    setting: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_places_of_copies_are_computed_again_for_changes_that_affect_them(setting: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("machine.workbench.session.planes.REST_S", 0.0)
 
     async def change_setting() -> list[Bench]:

@@ -80,7 +80,7 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
     )
 
 
-def test_what_lies_on_a_bench_is_read_as_it_was_written(bench: Bench) -> None:
+def test_an_autosaved_bench_is_read_as_it_was_written(bench: Bench) -> None:
     folder = new_folder()
     write_work(folder, bench)
     write_work(folder, bench)
@@ -117,7 +117,7 @@ def test_work_of_a_newer_version_is_refused_and_stays(bench: Bench) -> None:
     assert folders_kept() == [folder]
 
 
-def test_the_newest_ten_are_kept_and_what_a_bench_writes_to_is_nobody_else_s(bench: Bench) -> None:
+def test_the_newest_ten_autosaves_are_kept_and_each_folder_has_one_writer(bench: Bench) -> None:
     folders = [new_folder() for _ in range(MOST_KEPT + 2)]
     for folder in folders:
         write_work(folder, bench)
@@ -128,7 +128,7 @@ def test_the_newest_ten_are_kept_and_what_a_bench_writes_to_is_nobody_else_s(ben
     assert sum(folder.exists() for folder in folders) == MOST_KEPT + 1
 
 
-def test_a_full_disk_is_told_once_and_what_was_kept_before_is_still_there(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_reported_once_and_the_previous_autosave_remains(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(keeping, "AFTER_S", 0.0)
 
     async def change_twice() -> tuple[list[str], Path]:
@@ -171,7 +171,7 @@ class Slow:
         self._now -= 1
 
 
-def test_a_bench_that_closes_waits_for_the_write_under_way_writes_what_is_newer_and_removes_its_files_last(
+def test_a_closing_bench_finishes_its_write_saves_newer_changes_then_removes_its_files(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(keeping, "AFTER_S", 0.0)
@@ -204,7 +204,7 @@ def test_a_bench_that_closes_waits_for_the_write_under_way_writes_what_is_newer_
     assert not sent.parents[1].exists()
 
 
-def test_what_pages_have_sent_stays_for_the_next_start_where_it_could_not_be_kept(
+def test_uploads_stay_for_the_next_start_when_the_work_cannot_be_saved(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -275,7 +275,7 @@ def test_earlier_work_that_was_opened_is_there_as_it_was_after_undo(
     assert read_folder(folder).copies == 3
 
 
-def test_a_folder_that_goes_while_earlier_work_is_listed_is_left_out(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_folder_removed_while_earlier_work_is_listed_is_left_out(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> None:
     stays, goes = new_folder(), new_folder()
     for folder in (stays, goes):
         write_work(folder, bench)
@@ -290,7 +290,7 @@ def test_a_folder_that_goes_while_earlier_work_is_listed_is_left_out(bench: Benc
     assert folders_kept() == [stays]
 
 
-def test_kept_work_is_listed_where_the_system_has_no_locks_and_no_files_of_other_programs_are_touched(
+def test_without_file_locks_earlier_work_is_listed_and_files_of_others_are_left_alone(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
@@ -335,7 +335,7 @@ def left_by_a_killed_one(*names: str) -> Path:
     return folder
 
 
-def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_goes_with_the_program(temporary: Path) -> None:
+def test_a_refused_upload_is_deleted_at_once_and_an_open_one_when_the_program_ends(temporary: Path) -> None:
     sent = temporary / "sent"
     sent.mkdir()
     (sent / "large.stl").write_bytes(bytes(2**20 + 1))
@@ -354,7 +354,7 @@ def test_a_file_that_is_too_large_or_refused_is_not_kept_and_one_on_the_bench_go
     assert list(temporary.glob("tiltprint-edit-*")) == []
 
 
-def test_what_a_killed_program_has_received_is_told_for_a_day_and_then_removed(temporary: Path) -> None:
+def test_uploads_of_a_killed_program_are_listed_for_a_day_and_then_removed(temporary: Path) -> None:
     folder = left_by_a_killed_one("tee.stl")
     assert tidy_left() == tidy_left() == (folder,)
     assert names_in(folder) == [FOUND, "tee.stl"]
@@ -379,7 +379,7 @@ def test_a_folder_without_a_file_is_removed_when_it_is_not_new_and_that_of_one_t
     assert list(temporary.iterdir()) == []
 
 
-def test_what_was_left_in_several_folders_is_listed_together_the_newest_first(temporary: Path) -> None:
+def test_files_left_in_several_folders_are_listed_together_newest_first(temporary: Path) -> None:
     older, newer = left_by_a_killed_one("old.stl", "newest.stl"), left_by_a_killed_one("newer.stl")
     for age_s, name in enumerate(("newest.stl", "newer.stl", "old.stl")):
         (path,) = temporary.glob(f"*/*/{name}")

@@ -15,7 +15,7 @@ from tests.machine.prints import prints_line
 from tests.machine.running_workbench import workbench
 
 
-def test_a_frame_of_bytes_is_told_to_be_no_command_and_ends_no_line() -> None:
+def test_a_binary_frame_is_refused_and_does_not_close_the_connection() -> None:
     no_command = "the page has sent something that is not a command of the workbench"
     with workbench() as bench, bench.line() as page, prints_line(bench, "first") as printing:
         page.say(b"\x00")
@@ -50,7 +50,7 @@ class Page:
         self.heard.append(json.loads(text)["version"] if text else BEAT)
 
 
-def test_a_page_that_asks_for_beats_hears_one_whenever_there_has_been_no_news_for_so_long() -> None:
+def test_a_page_that_requests_heartbeats_receives_them_between_states() -> None:
     async def run() -> Page:
         source, page = Observable(), Page()
         page.awake.set()
@@ -66,7 +66,7 @@ def test_a_page_that_asks_for_beats_hears_one_whenever_there_has_been_no_news_fo
     assert asyncio.run(asyncio.wait_for(run(), 10.0)).heard == [0, BEAT, BEAT, 1]
 
 
-def test_fifty_pages_that_read_nothing_hold_up_nobody_and_hear_the_newest_when_they_read_again() -> None:
+def test_fifty_silent_pages_block_no_other_and_receive_the_newest_state_later() -> None:
     worded: list[int] = []
 
     async def run() -> tuple[Page, list[Page]]:
@@ -125,7 +125,7 @@ class Directions:
 
 
 @pytest.mark.parametrize("error", [None, WebSocketDisconnect(1006)])
-def test_a_line_of_which_one_direction_ends_leaves_nothing_and_is_no_fault(error: Exception | None) -> None:
+def test_a_half_closed_connection_leaves_no_task_and_is_not_an_error(error: Exception | None) -> None:
     async def run() -> int:
         directions = Directions()
         await until_either_ends(directions.ends(error), directions.waits())

@@ -52,7 +52,7 @@ def test_a_mesh_comes_back_from_its_file_as_it_was(colours: Any) -> None:
     assert stored.volume_mm3 == pytest.approx(7000.0 / 27.0)
 
 
-def test_what_goes_through_a_pipe_of_a_model_is_as_short_for_many_faces_as_for_few() -> None:
+def test_a_pickled_model_is_as_short_for_many_faces_as_for_few() -> None:
     few, many = model("a", tee()), model("a", ball(10.0, 480))
     assert many.faces > 100_000
     assert len(pickle.dumps(many)) < len(pickle.dumps(few)) + 100 < 1000
@@ -102,7 +102,7 @@ def test_a_closed_bench_leaves_no_model_and_no_file(tmp_path: Path) -> None:
     assert not folder.exists()
 
 
-def test_the_mesh_of_a_model_that_nobody_can_come_back_to_takes_no_room_any_more(tmp_path: Path) -> None:
+def test_the_mesh_of_a_model_that_no_step_can_reach_is_deleted(tmp_path: Path) -> None:
     (tmp_path / "tee.stl").write_bytes(stl(tee()))
 
     async def forget(session: Session) -> tuple[bool, bool]:
@@ -144,7 +144,7 @@ def project(path: Path, mesh: Mesh, given: Given, plan: PlanFile | None = None) 
     return path
 
 
-def test_a_project_opens_whatever_lies_on_the_bench_and_in_one_step(tmp_path: Path) -> None:
+def test_a_project_opens_over_any_bench_in_one_step(tmp_path: Path) -> None:
     (tmp_path / "large.stl").write_bytes(stl(Mesh(tee().vertices * 10.0, tee().faces)))  # 400 mm, 10 m at the project's scale
     path = project(tmp_path / "p.3mf", Mesh(tee().vertices / 25.4, tee().faces), Given(settings=("process.scale=25.4",)))
 
@@ -171,7 +171,7 @@ def test_a_project_with_a_damaged_plan_leaves_the_bench_as_it_was(tmp_path: Path
     assert read(work, tmp_path / "tee.stl")
 
 
-def test_what_a_slicer_file_marks_lies_on_the_bench_boxes_and_other_shapes_too(tmp_path: Path) -> None:
+def test_marks_of_a_slicer_file_are_on_the_bench_boxes_and_other_shapes(tmp_path: Path) -> None:
     block, ball = m3.Manifold.cube((20.0, 20.0, 20.0), True), m3.Manifold.sphere(4.0, 16)
     insert = Made(m3.Manifold.cube((4.0, 6.0, 8.0), True), "modifier", {"perimeters": "4"})
     path = prusaslicer(
@@ -209,7 +209,7 @@ def plated(bench: Bench) -> Plated:
     ((0.0, 37.0, 0.0), 300.0 + 100.0, None),
     ((90.0, 37.0, 11.0), 700.0, None),
 ])  # fmt: skip
-def test_what_overhangs_is_what_is_seen_from_below_and_does_not_stand_on_the_platform(
+def test_overhangs_are_faces_seen_from_below_that_are_not_on_the_build_plate(
     turns_deg: tuple[float, float, float], overhang_mm2: float, size_mm: tuple[float, float, float] | None
 ) -> None:
     stood = standing(tee(), turns_deg)
@@ -218,11 +218,11 @@ def test_what_overhangs_is_what_is_seen_from_below_and_does_not_stand_on_the_pla
     assert (stood.problem, stood.pedestal, stood.refusal) == ("", b"", "")
 
 
-def test_what_is_larger_than_the_machine_reaches_is_told_in_the_sentence_of_export() -> None:
+def test_a_model_beyond_the_reach_of_the_machine_is_reported_as_by_export() -> None:
     assert standing(tee(height=300.0)).problem.startswith("part 1 reaches Z 300.0 mm at A0.0 C0.0, Z goes from ")
 
 
-def test_copies_stand_beside_the_model_in_parts_too_and_what_has_no_room_is_told_in_the_sentence_of_export() -> None:
+def test_copies_have_places_also_in_parts_and_a_lack_of_room_is_reported_as_by_export() -> None:
     bench = replace(with_model(Bench(load(settings=["process.place_mm=[10, 5]"])), model(mesh=tee())), copies=3)
     stood = plated(bench)
     assert (len(stood.copies_mm), stood.copies_mm[0], stood.problem) == (3, (0.0, 0.0), "")
@@ -245,7 +245,7 @@ def test_models_that_cannot_be_put_on_a_pedestal_have_places_and_the_reason(monk
     assert (len(stood.copies_mm), stood.problem) == (2, "no feet")
 
 
-def test_on_a_pedestal_the_feet_stand_and_its_triangles_are_those_of_a_body_of_its_height() -> None:
+def test_a_model_stands_on_a_pedestal_whose_triangles_have_its_height() -> None:
     stood = standing(tee(), search__pedestal_mm=10)
     points, faces = np.frombuffer(stood.pedestal, "<u4", 2)
     places = np.frombuffer(stood.pedestal, "<f8", 3 * points, 8).reshape(-1, 3)
@@ -254,7 +254,7 @@ def test_on_a_pedestal_the_feet_stand_and_its_triangles_are_those_of_a_body_of_i
     assert (stood.overhang_mm2, stood.size_mm[2]) == (pytest.approx(300.0), pytest.approx(40.0))
 
 
-def test_what_cannot_be_put_on_a_pedestal_stands_without_one_and_that_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_model_that_cannot_be_put_on_a_pedestal_is_shown_without_one_with_the_reason(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(mesh: Mesh, height_mm: float) -> Mesh:
         raise MeshError("no feet")
 

@@ -53,7 +53,7 @@ def test_the_face_under_a_ray_is_the_nearest_of_all_that_it_meets() -> None:
     assert 20 < expected.count(-1) < 180
 
 
-def test_the_brush_takes_connected_faces_whose_middles_lie_in_its_circle_and_always_the_one_under_it() -> None:
+def test_the_brush_paints_connected_faces_in_its_circle_and_always_the_one_under_it() -> None:
     mesh = ball(10.0)
     middles = mesh.vertices[mesh.faces].mean(axis=1)
     face = int(np.argmax(middles[:, 0]))
@@ -94,7 +94,7 @@ def test_the_plate_has_millimetres_on_it_and_the_front_before_it() -> None:
     assert ticks == {4.0 * k for k in range(26)}
 
 
-def test_clips_are_drawn_where_they_stand_on_the_plate() -> None:
+def test_clips_are_drawn_at_their_place_on_the_plate() -> None:
     act = """const { bodiesOf } = modules["picture/shapes"], head = { silhouette_mm: [[1, 0], [5, 9]], boxes: [] };
     return [...bodiesOf({ table, cradle: [], head }, false).table.solid.places];"""
     clips = [{"name": "clip", "min_mm": [-10.0, 80.0, 0.0], "max_mm": [10.0, 95.0, 6.0]}]

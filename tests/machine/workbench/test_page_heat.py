@@ -26,7 +26,7 @@ def marked(ago: str) -> list[str]:
 
 
 @needs_node
-def test_what_has_just_been_told_is_not_marked() -> None:
+def test_fresh_temperatures_are_not_marked() -> None:
     assert on_fake_page(f"{HEARD} return heat();") == FRESH
 
 
@@ -37,7 +37,7 @@ def test_what_has_just_been_told_is_not_marked() -> None:
     "",  # the line to the workbench is lost, or the print hangs
 ])  # fmt: skip
 @pytest.mark.parametrize(("after_ms", "ago"), [(12_000, "12 s"), (5 * 60_000 + 30_000, "5 min"), (2 * 3_600_000, "2 h")])
-def test_what_nobody_tells_any_more_is_marked_with_its_age(tell: str, after_ms: int, ago: str) -> None:
+def test_old_temperatures_are_marked_with_their_age(tell: str, after_ms: int, ago: str) -> None:
     assert on_fake_page(f"{HEARD} {tell} fake.wait({after_ms}); return heat();") == marked(ago)
 
 

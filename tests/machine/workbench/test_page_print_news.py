@@ -19,7 +19,7 @@ PAGE = """
 
 
 @needs_node
-def test_the_title_of_the_tab_tells_how_much_is_printed_and_nothing_when_it_is_over() -> None:
+def test_the_tab_title_shows_the_progress_of_a_print_until_it_is_over() -> None:
     told = on_fake_page(
         f"{PAGE} const titles = []; tell('printing', 0.429); titles.push(document.title);"
         " tell('done', 1, { is_over: true, sentence: 'the print is done' }); titles.push(document.title); return titles;"
@@ -36,7 +36,7 @@ def test_the_browser_says_once_that_a_print_of_this_page_is_over() -> None:
 
 
 @needs_node
-def test_the_browser_is_asked_whether_it_may_only_when_a_print_begins() -> None:
+def test_permission_to_notify_is_requested_only_when_a_print_begins() -> None:
     act = "Notification.permission = 'default'; tell('ready', 0); const before = [...said]; $('begin').fire('click');"
     assert on_fake_page(f"{PAGE} {act} return [before, said];") == [[], ["asked"]]
 
@@ -55,7 +55,7 @@ def test_temperatures_of_ten_minutes_are_lines_with_the_newest_at_the_right_edge
 
 
 @needs_node
-def test_how_a_print_is_stands_on_the_tab_and_in_the_bar_of_every_tab() -> None:
+def test_the_state_of_a_print_is_on_the_tab_and_in_the_bar_of_every_tab() -> None:
     told = on_fake_page(
         f"{PAGE} tell('printing', 0.5, {{ how: 'printing, 50 %', texts: {{ 'run-news': 'box: printing' }} }});"
         " return ['run-state', 'bar-told', 'run-news'].map((id) => $(id).textContent);"
@@ -64,7 +64,7 @@ def test_how_a_print_is_stands_on_the_tab_and_in_the_bar_of_every_tab() -> None:
 
 
 @needs_node
-def test_heaters_that_are_proved_off_are_told_as_off_and_not_as_a_warning_and_no_sentence_twice() -> None:
+def test_heaters_confirmed_off_are_shown_as_off_and_no_sentence_is_shown_twice() -> None:
     told = on_fake_page(
         f"{PAGE} const sentence = 'the print was cancelled; heaters off', lines = ['tiltprint: ' + sentence, 'other'];"
         " tell('cancelled', 0.1, { is_over: true, nozzle_target_c: 0, heat_is_old: true, sentence, said: lines });"
@@ -76,7 +76,7 @@ def test_heaters_that_are_proved_off_are_told_as_off_and_not_as_a_warning_and_no
 
 
 @needs_node
-def test_a_camera_is_looked_at_every_two_seconds_until_its_print_is_over() -> None:
+def test_a_camera_picture_is_fetched_every_two_seconds_until_the_print_is_over() -> None:
     act = f"""{PAGE} tell('printing', 0.5, {{ webcam: true }});
         Object.assign($('webcam'), {{ complete: true }}); fake.wait(2000);
         const asked = $('webcam').src.split('?')[0]; $('webcam').onload();

@@ -81,7 +81,7 @@ def test_a_stop_that_finds_no_line_is_given_to_its_print_when_the_line_is_back_s
 
 
 @needs_node
-def test_a_stop_that_has_waited_for_a_line_too_long_is_not_given_and_that_is_told() -> None:
+def test_a_stop_that_waited_too_long_for_a_connection_is_dropped_and_reported() -> None:
     assert on_fake_page(f"{LINE_LOST} return back(11000, [1, 2]);") == [[], NOT_GIVEN]
 
 

@@ -17,16 +17,16 @@ HEARD = """
 
 
 @needs_node
-def test_nobody_is_told_before_there_is_a_state() -> None:
+def test_no_listener_is_called_before_the_first_state() -> None:
     assert on_fake_page(f"{HEARD} update({{ part: 5 }}); return [heard, store.part];") == [[], 5]
 
 
 @needs_node
-def test_what_a_listener_changes_comes_when_all_have_heard_of_the_change_before() -> None:
+def test_a_change_made_by_a_listener_follows_after_all_have_seen_the_previous_one() -> None:
     asked = f"{HEARD} update({{ state: {{ version: 1 }} }}); update({{ part: 1 }}); return heard;"
     assert on_fake_page(asked) == [[0, 0, "model"], [None, 1], [0, 1, "model"], [1, 2, "parts"]]
 
 
 @pytest.mark.parametrize("script", sorted(OWN.rglob("*.js")), ids=lambda file: file.stem)
-def test_nobody_but_the_store_writes_into_it(script: Path) -> None:
+def test_only_the_store_writes_to_its_state(script: Path) -> None:
     assert script.stem == "store" or re.findall(r"\bstore(?:\.\w+)+ [-+|&?]*=[^=>].*", script.read_text("utf-8")) == []

@@ -28,7 +28,7 @@ PAIRS = [
     (f"{option('copies', 3)}: a.gcode is G-code", "3 copies: a.gcode is G-code"),
     (f"{option('ranker', 'x')}: classic, learned or the name", "Search ranking x: classic, learned or the name"),
     (f"{advice('filament-change', '1:x')}: PART:LAYER or", "1:x under Copies and pauses: PART:LAYER or"),
-    (f"give them up, {advice('set', 'process.scale=25.4', 'give')}", "give them up, set Scale of the model to 25.4"),
+    (f"give them up, {advice('set', 'process.scale=25.4', 'give')}", "give them up, set Scale of the model to 2540 %"),
     (f"{option('set', 'process.walls=4')} and", "Walls = 4 and"),
     (f"X (lists all, {FORCE_GOES_ON})", "X (lists all, tick Continue anyway to print it)"),
     (f"{key_name('machine.tilt.limits_deg')} is [5, 3]", "Tilt axis: Range is [5, 3]"),
@@ -70,13 +70,13 @@ def test_an_error_keeps_its_marks_where_another_message_holds_it() -> None:
     (["process.infil_density=1"], "did you mean Infill density?"),
     (["material.nozzle_c=900"], "Nozzle"),
 ])  # fmt: skip
-def test_a_profile_that_is_wrong_is_told_by_labels(settings: list[str], page: str) -> None:
+def test_an_invalid_profile_is_reported_by_labels(settings: list[str], page: str) -> None:
     with pytest.raises(ProfileError) as refused:
         load(settings=settings)
     assert page in page_words(f"{refused.value}")
 
 
-def test_the_program_s_own_sentences_have_no_option_on_the_page() -> None:
+def test_sentences_of_the_program_name_no_option_on_the_page() -> None:
     with pytest.raises(ProfileError) as refused:
         parse_part_settings("2")
     sentences = [*REASONS.values(), *(text for _, *texts in ports.NO_PRINTERS.values() for text in texts), f"{refused.value}"]
@@ -85,13 +85,13 @@ def test_the_program_s_own_sentences_have_no_option_on_the_page() -> None:
     assert page_words(REASONS[Reason.PLATFORM]) == "it would cut into the build plate"
 
 
-def test_what_is_not_marked_stays_whatever_its_name_is() -> None:
+def test_unmarked_text_stays_even_if_it_looks_like_a_key() -> None:
     for text in ("demo:tree", "process.walls.toml", "--copies is 3.stl", "infill_density 2.stl: part 1, tilt 30°", "a \ufdd0 b"):
         assert page_words(text) == text.replace("\ufdd0", r"\ufdd0")
     assert page_words(f"{option('plan', '--copies 3.toml')} exists") == "the plan --copies 3.toml exists"
 
 
-def test_texts_in_lists_and_tables_are_said_so_and_numbers_stay() -> None:
+def test_texts_in_lists_and_tables_are_converted_and_numbers_stay() -> None:
     state = {"problem": f"{option('copies')} is 0", "n": 3, "rows": [{"a": [f"{key_name('process.walls')}"]}, 2, None]}
     assert in_page_words(state) == {"problem": "Copies is 0", "n": 3, "rows": [{"a": ["Walls"]}, 2, None]}
 

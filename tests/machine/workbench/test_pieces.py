@@ -7,7 +7,7 @@ from tests.machine.pages import unpacked
 from tests.shapes import box
 
 
-def test_what_the_machine_does_not_reach_is_told_in_the_words_of_the_page() -> None:
+def test_parts_beyond_the_reach_of_the_machine_are_reported_in_page_words() -> None:
     slab = decompose(box(900.0), "slab", load(), SearchRequest(parts=1))
     header, _ = unpacked(pieces_block(slab, load()))
     assert "Scale of the model makes the model smaller" in header["fit"]

@@ -90,7 +90,7 @@ def test_a_locked_plane_stays_where_it_is_until_it_is_unlocked() -> None:
     assert changed(locked, "lock", part=3, locked=False).now.bench.locked == frozenset()
 
 
-def test_a_lock_goes_with_its_plane() -> None:
+def test_a_lock_is_removed_with_its_plane() -> None:
     locked = changed(History(Step("", BENCH)), "lock", part=3, locked=True).now.bench
     assert with_cuts(locked, (C, B)).locked == {B}
     assert with_cuts(locked, (A, C)).locked == frozenset()
@@ -153,7 +153,7 @@ def test_planes_and_marks_go_along_with_a_model_that_is_scaled_and_lifted() -> N
     assert lifted.zones == Zones(keep=(Zone((2.0, 4.0, 16.0), (18.0, 18.0, 28.0)),), no_support=(Grown((-24.0, 2.0, 70.0), 1.0),))
 
 
-def test_marks_go_along_with_a_model_that_is_read_turned_otherwise_and_larger() -> None:
+def test_marks_move_with_a_model_that_is_read_again_turned_and_scaled() -> None:
     turn = turned_by((0.0, 90.0, 0.0))
     again = model(mesh=set_on_plate(tee(), turn).transform(2.0 * np.eye(3)))
     cut = with_profile(replace(MARKED, cuts=(PlannedPart((0.6, 0.0, 0.8), 20.0),)), MARKED.given, LIFTED)
@@ -168,7 +168,7 @@ def test_marks_go_along_with_a_model_that_is_read_turned_otherwise_and_larger() 
         assert zone.away_mm(workpiece_mesh(bench)) < 0.005
 
 
-def test_what_would_carry_a_box_beyond_what_a_plan_may_have_is_refused() -> None:
+def test_a_move_of_a_box_beyond_the_limits_of_a_plan_is_refused() -> None:
     far = replace(MARKED, zones=Zones(no_seam=(BOX, Zone((9e4, 0.0, 0.0), (9.5e4, 1.0, 1.0)))))
     assert far.model is not None
     said = r"no_seam 2: its box would have min_mm \[180000, 0, 0\] and max_mm \[190000, 2, 2\]: -100000 to 100000 is allowed"
@@ -176,6 +176,6 @@ def test_what_would_carry_a_box_beyond_what_a_plan_may_have_is_refused() -> None
         with_scaled_model(far, far.model, 2.0)
 
 
-def test_faces_of_several_kinds_are_told_of_each() -> None:
+def test_faces_marked_with_several_kinds_are_listed_for_each() -> None:
     both = replace(MARKED, zones=Zones(no_seam=(Grown((0.0, 5.0, 10.0), 1.0),), no_support=(ARM,)))
     assert named_faces(both).sum(axis=1).tolist() == [0, 6, 2, 0]

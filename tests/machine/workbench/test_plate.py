@@ -189,7 +189,7 @@ def test_a_project_of_an_older_version_opens_with_its_other_models_uncut(folder:
     assert (folder / "old.gcode").read_bytes() == (folder / "new.gcode").read_bytes()
 
 
-def test_a_model_opened_over_another_one_can_be_put_beside_it_instead(bench: Running, folder: Path) -> None:
+def test_a_model_opened_over_another_one_can_be_added_to_its_plate_instead(bench: Running, folder: Path) -> None:
     with bench.line() as page:
         bench.send(folder / "tee.stl")
         page.do("add", normal=[0, 0, 1], offset_mm=20.0)
@@ -217,7 +217,7 @@ def test_a_model_opened_over_another_one_can_be_put_beside_it_instead(bench: Run
         page.until(lambda state: state["copies_told"] == "All 2 stand on the plate.")
 
 
-def test_what_is_a_plate_of_its_own_is_not_put_beside_a_model(bench: Running, folder: Path) -> None:
+def test_a_file_that_is_a_plate_is_not_added_to_one(bench: Running, folder: Path) -> None:
     (folder / "print.gcode").write_text("G28\n")
     with bench.line() as page:
         bench.send(folder / "tee.stl")

@@ -62,7 +62,7 @@ def _is_locked(record: Path, since_s: float) -> bool:
     return bool(json.loads(record.read_text())["locked"]) and record.stat().st_mtime > since_s
 
 
-def test_the_port_of_a_server_whose_lines_are_not_over_yet_is_taken_at_once() -> None:
+def test_the_port_of_a_server_with_open_connections_can_be_used_again_at_once() -> None:
     with listen(0) as own:
         at = own.getsockname()
         with socket.create_connection(at):

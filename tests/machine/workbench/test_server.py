@@ -45,16 +45,16 @@ def test_a_line_from_another_origin_or_without_the_token_is_refused(bench: Runni
     assert refused.value.response.status_code == 403
 
 
-def test_to_ask_for_a_model_that_has_gone_from_the_bench_is_no_fault_of_a_page(bench: Running) -> None:
+def test_a_request_for_a_model_no_longer_on_the_bench_is_not_an_error(bench: Running) -> None:
     assert bench.ask("model/another") == (204, b"")
 
 
-def test_a_key_whose_hexadecimal_digits_are_all_decimal_is_one_like_any_other(bench: Running) -> None:
+def test_a_key_with_only_decimal_digits_is_valid(bench: Running) -> None:
     assert bench.ask("model/1234567890123456") == (204, b"")
     assert bench.ask(f"model/{'9' * 5000}")[0] == 404
 
 
-def test_a_broken_model_is_told_as_the_command_line_tells_it(
+def test_a_broken_model_is_reported_as_on_the_command_line(
     bench: Running, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     broken = folder / "broken.stl"
@@ -67,7 +67,7 @@ def test_a_broken_model_is_told_as_the_command_line_tells_it(
         assert page.until(lambda state: state["problem"])["problem"] == sentence
 
 
-def test_a_command_that_is_none_is_told_and_ends_nothing(bench: Running) -> None:
+def test_an_unknown_command_is_reported_and_closes_no_connection(bench: Running) -> None:
     with bench.line() as page:
         for text in ("", "[]", "{", '"undo"', "[" * 50_000):
             page.say(text)
@@ -139,7 +139,7 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
     assert main(["decompose", "tee.stl", *QUICK, "--set=search.seam_mm=100", "--ranker", "learned", "-o", "parts"]) == 0
     with bench.line() as page:
         page.do("set", key="search.seam_mm", value="100")  # too expensive to cut
-        page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])
+        page.until(lambda state: state["undo"] == "set Width of a seam's blemish" and not state["busy"])
         bench.send(folder / "tee.stl")
         page.do("search", ranker="none")
         assert "Search ranking none: classic, learned or the name of" in page.until(lambda state: state["problem"])["problem"]
@@ -156,11 +156,15 @@ def test_a_model_is_laid_down_with_its_parts_as_the_command_line_does_it(bench: 
         page.do("undo")
         page.until(lambda state: state["rotation"] == as_it_lies["rotation"] and state["front"] == as_it_lies["front"])
         page.do("set", key="search.seam_mm", value="0.8")
-        page.until(lambda state: state["undo"] == "set search.seam_mm" and not state["busy"])  # the next test shares this bench
+        page.until(
+            lambda state: state["undo"] == "set Width of a seam's blemish" and not state["busy"]
+        )  # the next test shares this bench
 
 
 @pytest.mark.parametrize("kept", ["turned", "locked", "marked", "set"])
-def test_a_model_that_a_person_has_turned_locked_or_marked_stays_as_it_lies(bench: Running, folder: Path, kept: str) -> None:
+def test_a_search_keeps_the_orientation_of_a_model_that_was_turned_locked_or_marked(
+    bench: Running, folder: Path, kept: str
+) -> None:
     (folder / "tee.stl").write_bytes(stl(tee()))
     with bench.line() as page:
         bench.send(folder / "tee.stl")
@@ -176,7 +180,7 @@ def test_a_model_that_a_person_has_turned_locked_or_marked_stays_as_it_lies(benc
             page.do("lock", part=2, locked=True)
         words = {
             "turned": "turn the model",
-            "set": "set search.objective",
+            "set": "set Objective",
             "marked": "mark: no seam here",
             "locked": "lock a plane",
         }
@@ -288,7 +292,7 @@ def test_slices_are_the_g_code_of_the_command_line_and_are_out_of_date_when_the_
         assert page.until(lambda state: not state["sliced"])["compared"] == []
 
 
-def test_what_is_marked_on_a_model_in_one_piece_is_in_a_plan_that_its_command_takes(bench: Running, folder: Path) -> None:
+def test_marks_on_a_model_in_one_piece_are_in_the_plan_that_its_command_uses(bench: Running, folder: Path) -> None:
     (folder / "box.stl").write_bytes(stl(box(8, 8, 2)))
     with bench.line() as page:
         bench.send(folder / "box.stl")
@@ -346,7 +350,7 @@ def test_copies_and_pauses_are_the_command_line_s_and_their_sentences_name_field
         page.until(lambda state: (state["copies"], state["stops"]) == (1, []))
 
 
-def test_another_machine_keeps_all_planes_and_tells_which_it_cannot_cut(bench: Running, folder: Path) -> None:
+def test_another_machine_keeps_all_planes_and_reports_those_it_cannot_cut(bench: Running, folder: Path) -> None:
     (folder / "tee.stl").write_bytes(stl(tee()))
     with bench.line() as page:
         bench.send(folder / "tee.stl")
@@ -392,9 +396,7 @@ def colours_in(picture: bytes) -> set[str]:
     return {name for name, more in (("orange", red - blue), ("blue", blue - red)) if (more > 60).any()}
 
 
-def test_work_by_hand_is_put_away_when_another_model_is_opened_and_lies_there_as_it_was_when_it_is_opened_again(
-    bench: Running, folder: Path
-) -> None:
+def test_work_by_hand_is_kept_when_another_model_is_opened_and_can_be_opened_again(bench: Running, folder: Path) -> None:
     (folder / "own.stl").write_bytes(stl(tee()))
     (folder / "next.stl").write_bytes(stl(box(10.0, 10.0, 10.0)))
     origin = f"http://127.0.0.1:{bench.port}"
@@ -436,7 +438,7 @@ def test_work_by_hand_is_put_away_when_another_model_is_opened_and_lies_there_as
         assert bench.ask("kept/nothing", "DELETE", Origin=origin)[0] == 422
 
 
-def test_figures_and_the_list_of_orientations_follow_what_a_hand_does(bench: Running, folder: Path) -> None:
+def test_figures_and_stable_orientations_follow_edits_by_hand(bench: Running, folder: Path) -> None:
     (folder / "hand.stl").write_bytes(stl(tee()))
     with bench.line() as page:
         bench.send(folder / "hand.stl")
@@ -464,7 +466,7 @@ def test_figures_and_the_list_of_orientations_follow_what_a_hand_does(bench: Run
         assert (present["words"], present["overhang_mm2"]) == ("as it lies now", turned["overhang_mm2"])
 
 
-def test_pages_that_read_nothing_hold_up_nobody(bench: Running) -> None:
+def test_pages_that_read_nothing_block_no_other(bench: Running) -> None:
     deaf = []
     for _ in range(10):
         own = socket.create_connection(("127.0.0.1", bench.port))
@@ -506,7 +508,7 @@ def ended_s() -> float:
         return time.monotonic() - began
 
 
-def test_what_is_not_there_is_one_sentence(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_missing_resource_is_reported_in_one_sentence(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]
         assert main(["edit", "--no-browser", "--port", str(port)]) == 1

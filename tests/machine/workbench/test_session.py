@@ -105,7 +105,7 @@ def test_edits_that_follow_each_other_quickly_leave_what_they_leave_one_by_one(e
     assert [part.offset_mm for part in when_done(work).bench.cuts or ()] == offsets_mm
 
 
-def test_figures_follow_the_hand_at_once_and_what_else_is_cut_is_looked_at_when_it_rests() -> None:
+def test_figures_follow_a_drag_at_once_and_other_parts_are_checked_when_it_pauses() -> None:
     """The stem of the tee is a square of 10 mm: a cut has a rim of 40 mm at any height."""
     tried: list[tuple[tuple[float, ...], int, float | None]] = []
 
@@ -132,7 +132,7 @@ def test_figures_follow_the_hand_at_once_and_what_else_is_cut_is_looked_at_when_
     assert tried == [(held, 0, 80.0), (newest, 1, 80.0), (newest, 0, 80.0)]
 
 
-def test_one_command_goes_several_steps_back_or_forward_as_far_as_there_are_some() -> None:
+def test_one_command_undoes_or_redoes_several_steps_as_far_as_there_are_some() -> None:
     async def work(session: Session) -> None:
         for deg in (10, 20, 30):
             obey(session, {"do": "turn", "axis": "x", "deg": deg})
@@ -145,7 +145,7 @@ def test_one_command_goes_several_steps_back_or_forward_as_far_as_there_are_some
     assert session.history.undo(0) is session.history.redo(-1) is session.history
 
 
-def test_a_turn_that_is_asked_for_while_an_edit_is_tried_comes_after_it() -> None:
+def test_a_turn_requested_while_an_edit_is_tried_follows_it() -> None:
     async def work(session: Session) -> None:
         obey(session, {"do": "add", "normal": list(UP), "offset_mm": 5.0, "after": 1})
         await asyncio.sleep(0)
@@ -158,7 +158,7 @@ def test_a_turn_that_is_asked_for_while_an_edit_is_tried_comes_after_it() -> Non
 
 
 @pytest.mark.parametrize("turns", range(4))  # of the loop between the two commands
-def test_a_plane_that_is_locked_while_it_is_moved_is_locked_where_it_comes_to_stand(turns: int) -> None:
+def test_a_plane_that_is_locked_while_it_is_moved_is_locked_at_its_new_position(turns: int) -> None:
     async def work(session: Session) -> None:
         obey(session, {"do": "add", "normal": [*UP], "offset_mm": 5, "after": 1})
         await settled(session)
@@ -200,7 +200,7 @@ SET_FOR_ONE = Given(
 
 
 @pytest.mark.parametrize("name", ["b", "a"])  # of another file, or of the same one opened again
-def test_a_model_starts_at_its_own_size_way_and_place_whatever_was_set_for_the_one_before(name: str) -> None:
+def test_a_model_opens_without_the_scale_rotation_and_place_of_the_previous_one(name: str) -> None:
     async def work(session: Session) -> None:
         async def read(task: Any, *given: Any, **more: Any) -> Any:
             return model(f"{given[1]} at {given[2].process.scale:g}") if task.__name__ == "read_model" else ()
@@ -232,7 +232,7 @@ def test_a_further_bench_has_the_settings_of_another_one_but_not_the_scale_of_it
     assert asyncio.run(opened()).settings == ("process.walls=4",)
 
 
-def test_the_best_of_a_search_that_is_stopped_is_taken_at_once_and_its_price_told_later() -> None:
+def test_the_best_result_of_a_stopped_search_is_used_at_once_and_priced_later() -> None:
     best = FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0)
 
     async def work(session: Session) -> None:
@@ -268,7 +268,7 @@ def test_a_turn_that_takes_the_planes_names_the_pauses_that_go_with_them() -> No
     )
 
 
-def test_advice_to_take_a_number_of_parts_goes_when_it_is_taken() -> None:
+def test_advice_to_choose_a_number_of_parts_disappears_once_it_is_followed() -> None:
     rows = (FrontRow((), 9.0, 0.0, 9.0, chosen=True), FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0))
     advised: list[list[dict[str, Any]]] = []
 
@@ -284,7 +284,7 @@ def test_advice_to_take_a_number_of_parts_goes_when_it_is_taken() -> None:
     assert advised == [[hangs, {"text": "2 parts would be better", "parts": 2}], [hangs]]
 
 
-def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_begin() -> None:
+def test_slicing_ends_with_a_note_when_the_bench_changes_and_can_begin_again() -> None:
     async def work(session: Session) -> None:
         obey(session, {"do": "slice"})
         await asyncio.sleep(0)
@@ -301,7 +301,7 @@ def test_slices_whose_bench_is_changed_meanwhile_end_and_say_so_and_others_may_b
     assert session.slicing.done.bench is session.bench
 
 
-def test_slices_wait_for_the_settings_that_were_asked_for_before() -> None:
+def test_slicing_waits_for_settings_requested_before_it() -> None:
     async def work(session: Session) -> None:
         async def read(task: Any, *given: Any, **more: Any) -> Any:
             for _ in range(5):
@@ -320,7 +320,7 @@ def test_slices_wait_for_the_settings_that_were_asked_for_before() -> None:
     assert session.problem == ""
 
 
-def test_what_a_page_is_refused_no_other_page_is_told_and_its_next_step_takes_it_back() -> None:
+def test_a_refusal_is_shown_only_to_its_own_page_until_its_next_command() -> None:
     told = []
 
     async def work(session: Session) -> None:
@@ -342,7 +342,7 @@ def test_what_a_page_is_refused_no_other_page_is_told_and_its_next_step_takes_it
     assert told == [{"mine": mine, "yours": yours}, {"yours": yours}, {}]
 
 
-def test_a_plane_that_is_refused_is_put_at_the_nearest_place_when_that_is_asked_for() -> None:
+def test_a_refused_plane_is_placed_at_the_nearest_valid_position_on_request() -> None:
     def bounded(session: Session) -> None:
         async def answer(task: Any, *given: Any, **more: Any) -> Any:
             if task.__name__ == "nearest":
@@ -455,7 +455,7 @@ def test_an_invalid_plane_that_is_put_into_an_impossible_order_is_reported() -> 
     assert (session.bench.cuts, session.note) == ((high, low), "part 2 cannot be cut off: nothing is left above")
 
 
-def test_a_plane_is_moved_beside_one_of_which_it_is_not_known_yet_that_it_is_invalid() -> None:
+def test_a_plane_can_be_moved_while_it_is_unknown_that_another_one_is_invalid() -> None:
     low, high, lower = (PlannedPart(UP, offset_mm) for offset_mm in (5.0, 25.0, 4.0))
 
     async def work(session: Session) -> None:
@@ -471,7 +471,7 @@ def test_a_plane_is_moved_beside_one_of_which_it_is_not_known_yet_that_it_is_inv
 @pytest.mark.parametrize(
     ("error", "told"), [(CutError("part 2 cannot be cut off: it is marked"), ""), (UserError("a bug"), "a bug")]
 )
-def test_parts_that_cannot_be_drawn_tell_why_unless_a_plane_cannot_be_cut(error: UserError, told: str) -> None:
+def test_parts_that_cannot_be_drawn_report_why_unless_a_plane_is_invalid(error: UserError, told: str) -> None:
     async def work(session: Session) -> None:
         async def draw(task: Any, *given: Any, **more: Any) -> Any:
             if task.__name__ == "draw_pieces":
@@ -513,7 +513,7 @@ def test_a_search_that_is_stopped_says_what_became_of_it_until_something_else_is
     ]
 
 
-def test_a_search_that_replaces_planes_made_by_hand_says_so_and_how_to_have_them_back() -> None:
+def test_a_search_that_replaces_planes_made_by_hand_says_how_to_get_them_back() -> None:
     found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
     notes: list[str] = []
 
@@ -547,7 +547,7 @@ def test_a_search_that_is_stopped_says_whether_it_has_replaced_planes_made_by_ha
     assert sentences == [f"The search was stopped; the best so far is used: 2 parts{end}"]
 
 
-def test_a_search_that_begins_in_the_instant_in_which_another_is_stopped_goes_on() -> None:
+def test_a_search_that_begins_while_another_one_is_being_stopped_continues() -> None:
     found = FrontRow((Plane(np.array(UP), 20.0),), 0.0, 0.0, 0.0, chosen=True)
 
     async def work(session: Session) -> None:
@@ -625,7 +625,7 @@ def test_a_search_without_the_name_of_a_ranker_is_a_classic_one(given: dict[str,
     assert rankers == ["classic"]
 
 
-def test_prices_go_on_while_the_bench_changes_in_what_does_not_decide_them_and_a_front_that_was_found_has_its_own() -> None:
+def test_pricing_continues_through_unrelated_changes_and_a_new_front_has_its_own_prices() -> None:
     rows = (FrontRow((), 9.0, 0.0, 9.0), FrontRow((Plane(np.array(UP), 5.0),), 1.0, 2.0, 3.0, chosen=True))
     priced: list[int] = []
 
@@ -659,7 +659,7 @@ def reading_plates(session: Session) -> None:
     session.quick.run = read  # type: ignore[method-assign]
 
 
-def test_the_first_plate_of_a_file_can_be_added_instead_also_after_another_one_was_looked_at() -> None:
+def test_the_first_plate_of_a_file_can_be_added_after_another_one_was_opened() -> None:
     offered: list[str] = []
 
     async def work(session: Session) -> None:
@@ -679,9 +679,7 @@ def test_the_first_plate_of_a_file_can_be_added_instead_also_after_another_one_w
     assert (bench.model.name, [other.model and other.model.name for other in bench.beside]) == ("a", ["b.3mf"])
 
 
-def test_a_demo_that_is_cut_by_its_plan_says_too_that_the_work_before_it_is_kept(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_opening_a_demo_with_a_plan_says_that_the_previous_work_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path))
 
     async def work(session: Session) -> None:
@@ -771,7 +769,7 @@ def test_a_model_chosen_in_one_piece_stays_so_when_a_setting_changes() -> None:
 
 
 @pytest.mark.parametrize("key", ["", "=:", "walls"])
-def test_what_is_no_key_is_not_set(key: str) -> None:
+def test_an_unknown_key_is_not_set(key: str) -> None:
     async def work(session: Session) -> None:
         obey(session, {"do": "set", "key": key, "value": ":"})
 

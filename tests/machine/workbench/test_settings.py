@@ -68,13 +68,13 @@ def test_profiles_are_listed_by_what_people_call_them() -> None:
     assert profile_labels("process", "gone.toml")["gone.toml"] == "gone"
 
 
-def test_choices_and_yes_or_no_are_told_as_such() -> None:
+def test_choices_and_booleans_are_listed_as_such() -> None:
     assert described("process.seam")["choices"] == ["aligned", "corner", "rear", "nearest", "random"]
     assert described("process.ironing")["kind"] == "boolean"
     assert described("search.time_limit_s")["value"] is None
 
 
-def test_every_key_can_be_typed_and_what_is_told_of_it_is_taken_back_as_the_same() -> None:
+def test_every_key_can_be_typed_and_its_shown_value_is_accepted_as_the_same() -> None:
     rows = settings_list(load(), USUAL)
     assert {row["key"] for row in rows} == {key for name, kind in SECTIONS.items() for key, _ in keys(kind, f"{name}.")}
     assert {row["kind"] for row in rows} == {"number", "integer", "boolean", "choice", "numbers", "text", "block", "rows"}
@@ -114,12 +114,12 @@ def test_a_block_names_its_placeholders_and_one_that_cannot_be_filled_in_is_refu
         ("[[1.0], 2.0", r"machine\.head\.silhouette_mm is \"\[\[1.0\], 2.0\": it must be a list of one or more pairs of numbers"),
     ],
 )
-def test_a_list_is_refused_in_the_profile_s_own_sentence(typed: str, sentence: str) -> None:
+def test_an_invalid_list_is_refused_in_the_sentence_of_the_profile(typed: str, sentence: str) -> None:
     with pytest.raises(ProfileError, match=sentence):
         profile_as_given(with_setting(USUAL, "machine.head.silhouette_mm", typed), load())
 
 
-def test_nothing_leaves_out_what_may_be_left_out_and_is_no_change_where_the_profile_has_nothing() -> None:
+def test_an_empty_value_leaves_out_an_optional_key() -> None:
     wound = with_setting(USUAL, "machine.turn.budget_deg", "720")
     assert (described("machine.turn.budget_deg")["optional"], described("machine.clearance_mm")["optional"]) == (True, False)
     assert profile_as_given(with_setting(wound, "machine.turn.budget_deg", ""), load()).machine.turn.budget_deg is None
@@ -128,7 +128,7 @@ def test_nothing_leaves_out_what_may_be_left_out_and_is_no_change_where_the_prof
         profile_as_given(with_setting(USUAL, "machine.clearance_mm", ""), load())
 
 
-def test_what_is_set_is_marked_and_goes_back() -> None:
+def test_a_changed_key_is_marked_and_can_be_reset() -> None:
     changed = with_setting(with_setting(USUAL, "process.walls", "3"), "process.walls", "4")
     assert changed.settings == ("process.walls=4",)
     assert (described("process.walls", changed)["value"], described("process.walls", changed)["changed"]) == (4, True)
@@ -163,7 +163,7 @@ def own(bench: Bench) -> dict[int, dict[str, object]]:
     return {settings.part: settings.process for settings in bench.profile.parts}
 
 
-def test_a_part_has_values_of_its_own_that_are_marked_and_go_back() -> None:
+def test_settings_of_a_part_are_marked_and_can_be_reset() -> None:
     bench = with_own(with_own(BENCH, 2, "process.walls", "5"), 2, "seam", "rear")
     assert own(bench) == {2: {"walls": 5, "seam": "rear"}}
     row = next(row for row in settings_list(bench.profile, Given(), 2) if row["key"] == "process.walls")
@@ -172,7 +172,7 @@ def test_a_part_has_values_of_its_own_that_are_marked_and_go_back() -> None:
     assert own(changed_bench(bench, "reset_part", part=2)) == {}
 
 
-def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
+def test_only_keys_that_a_part_may_set_are_listed() -> None:
     first, second = ({row["key"] for row in settings_list(load(), Given(), part)} for part in (1, 2))
     assert "process.scale" not in first | second
     assert second - first == {f"process.{key}" for key in OF_PARTS_ON_PLASTIC}
@@ -187,7 +187,7 @@ def test_only_what_a_part_may_have_of_its_own_is_listed() -> None:
         ((LOW,), "--pause 1:3 --filament-change 9:1", "cut: removed with part 3: --pause 3:15 (Undo brings it back)"),
     ],
 )
-def test_a_pause_goes_with_its_part_and_says_so_and_undo_brings_it_back(
+def test_a_pause_is_removed_with_its_part_with_a_note_and_undo_restores_it(
     cuts: tuple[PlannedPart, ...], stops: str, lost: str
 ) -> None:
     steps = History(Step("", replace(BENCH, stops=parse_stops(["1:3", "3:15"], ["9:1"]))))
@@ -205,7 +205,7 @@ def test_settings_follow_the_plane_of_their_part_and_go_with_it() -> None:
     assert own(with_cuts(bench, (LOW,))) == {}
 
 
-def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_brings_it_back() -> None:
+def test_settings_removed_with_their_part_are_reported_and_undo_restores_them() -> None:
     bench = with_own(with_own(BENCH, 3, "ironing", "true"), 1, "walls", "5")
     steps = History(Step("", replace(bench, stops=parse_stops(["3:15"], []))))
     after = steps.do("cut", with_cuts(steps.now.bench, (LOW,)))
@@ -228,7 +228,7 @@ def test_what_a_part_had_of_its_own_is_told_when_it_goes_with_its_part_and_undo_
         ({"part": 2, "key": "process.walls", "value": "-1"}, r"part 2: process\.walls"),
     ],
 )
-def test_what_a_part_cannot_have_is_told(asked: dict[str, object], sentence: str) -> None:
+def test_a_key_that_a_part_cannot_set_is_refused(asked: dict[str, object], sentence: str) -> None:
     with pytest.raises((PlanError, ProfileError), match=sentence):
         changed_bench(BENCH, "set_part", **asked)
 
@@ -259,7 +259,7 @@ def test_the_command_line_sets_blocks_lists_and_names_as_they_are() -> None:
 
 
 @pytest.mark.parametrize("angles_deg", [(20.0, -50.0, 130.0), (0.0, 90.0, 30.0), (0.0, 0.0, 0.0)])
-def test_the_turns_of_the_command_line_stand_the_model_as_it_is(angles_deg: tuple[float, float, float]) -> None:
+def test_the_rotation_of_the_command_line_reproduces_the_orientation(angles_deg: tuple[float, float, float]) -> None:
     profile = load(settings=["process.rotate_deg=[10, 0, 0]"])
     turned = changed_bench(Bench(profile, BENCH.model), "stand", rotation=turned_by(angles_deg).tolist())
     assert turned_by(turns_deg(turned)) == pytest.approx(turned_by(angles_deg) @ turned_by((10.0, 0.0, 0.0)), abs=1e-9)

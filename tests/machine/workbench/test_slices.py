@@ -19,6 +19,7 @@ from machine.workbench.work.slices import Sliced, open_gcode, walls
 from profiles.errors import PlanError
 from profiles.profile import load
 from slicer.slice import slice_parts
+from tests.machine.pages import opened
 from tests.shapes import box
 from tests.slicer.hand import cut, profile
 
@@ -26,7 +27,7 @@ SIDE = (1.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("most", [60_000, 100])
-def test_the_walls_of_a_part_lie_on_its_surface_wherever_it_is_printed_to(most: int) -> None:
+def test_the_walls_of_a_part_are_on_its_surface_in_every_printing_direction(most: int) -> None:
     parts = cut(box(30, 10, 10), (SIDE, 5.0))
     values = np.frombuffer(walls(parts[1], slice_parts(parts, profile())[1], most), "<f4")
     pieces = values[3:].reshape(-1, 7)
@@ -44,7 +45,7 @@ def test_the_walls_of_a_part_lie_on_its_surface_wherever_it_is_printed_to(most: 
     assert (np.median(from_middle_mm) < 4.6) == (most != 100)  # inner walls where there is room for them
 
 
-def test_g_code_with_errors_is_saved_only_for_who_wants_it_all_the_same(tmp_path: Path) -> None:
+def test_g_code_with_errors_is_saved_only_after_confirmation(tmp_path: Path) -> None:
     error = Finding("error", "contact", 12, 1, 3, "the nozzle touches the part")
     cost = Alternative("in 1 part", "", 1, 60.0, 1.0, 1.0, 0.0, 0.0)
     known = known_findings(["G28"], profile(), [error])
@@ -86,7 +87,7 @@ def test_the_first_error_is_the_problem_and_says_which_finding_it_is() -> None:
     assert verdict_of((CRASH,), load(), 0.0, out_of_date=False)["text"] == "1 problem: the nozzle touches the part"
 
 
-def test_what_hangs_gets_a_button_that_switches_support_on_where_it_is_off() -> None:
+def test_overhangs_without_support_get_a_button_that_switches_support_on() -> None:
     off = load(settings=["process.support=none"])
     verdict = verdict_of((UNCALIBRATED,), off, 812.4, out_of_date=False)
     assert (verdict["text"], verdict["remedy"]) == ("Ready to print, but 812 mm² would need support", SUPPORT_ON)
@@ -97,6 +98,15 @@ def test_what_hangs_gets_a_button_that_switches_support_on_where_it_is_off() -> 
 def test_slices_of_another_bench_are_to_be_made_again() -> None:
     verdict = verdict_of((CRASH,), load(), 0.0, out_of_date=True)
     assert (verdict["kind"], verdict["remedy"]) == ("stale", SLICE_AGAIN)
+
+
+def test_the_page_of_a_gcode_file_without_a_machine_lists_every_error_of_the_machine_it_is_tried_for(tmp_path: Path) -> None:
+    file = tmp_path / "far.gcode"
+    file.write_text("G21\nG90\nM83\nG28\nM104 S210\nM109 S210\nG1 Z0.3 F600\nG1 X9999 E1 F600\nM104 S0\n")
+    tried = open_gcode(print, ModelRequest(str(file), load()), tmp_path / "page", tmp_path / "copy")
+    listed = {finding["message"] for finding in opened(tried.page.read_bytes())[0]["findings"] if finding["severity"] == "error"}
+    assert len(listed) == len(tried.errors) > 0
+    assert any("9999" in message for message in listed)
 
 
 def test_a_gcode_file_that_is_tried_for_another_machine_has_another_page(tmp_path: Path) -> None:

@@ -93,7 +93,7 @@ def test_one_bench_with_much_to_do_does_not_keep_another_one_waiting_for_all_of_
     assert done == ["busy 0", "idle", "busy 1", "busy 2"]
 
 
-def test_a_task_that_is_cancelled_ends_its_own_process_alone_and_one_that_waits_ends_none(
+def test_a_cancelled_task_ends_only_its_own_process_and_a_waiting_one_ends_none(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     started, pool = Started(monkeypatch), WorkerPool(2)
@@ -135,7 +135,7 @@ def test_a_task_that_is_cancelled_in_any_of_its_first_moments_leaves_no_process(
     assert not any(is_there(process.process.pid) for process in started.processes)
 
 
-def test_a_process_that_rests_goes_and_the_next_task_starts_another(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_idle_process_ends_and_the_next_task_starts_another(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(worker_pool, "REST_AFTER_S", 0.05)
     started, pool = Started(monkeypatch), WorkerPool(1)
 
@@ -195,7 +195,7 @@ def test_a_search_that_waits_for_the_processes_of_other_benches_says_so() -> Non
     assert run(work(), pools.long) == ("beginning", "waiting until the work of other benches is done")
 
 
-def test_planes_are_tried_on_their_own_bench_whoever_had_the_process_in_between() -> None:
+def test_planes_are_tried_on_their_own_bench_when_processes_are_shared() -> None:
     pools = WorkerPools()
     pools.hand = WorkerPool(1)
 

@@ -22,12 +22,12 @@ def calls() -> Isolation:
     return Isolation()
 
 
-def test_calls_of_a_thread_run_in_one_process_of_its_own(calls: Isolation) -> None:
+def test_calls_of_a_thread_run_in_its_own_process(calls: Isolation) -> None:
     assert calls.call(greet, ("world",)) == "hello world"
     assert calls.call(process, ()) == calls.call(process, ()) != os.getpid()
 
 
-def test_what_a_call_raises_is_told_once_in_a_sentence(calls: Isolation, tmp_path: Path) -> None:
+def test_an_error_of_a_call_is_reported_once_in_one_sentence(calls: Isolation, tmp_path: Path) -> None:
     with pytest.raises(CallError, match=r"^ValueError: not this one$"):
         calls.call(refuse, (tmp_path / "begun",), retries=3)
     assert (tmp_path / "begun").read_text() == "begun "
@@ -38,7 +38,7 @@ def test_a_result_that_cannot_be_sent_is_a_sentence_too(calls: Isolation) -> Non
         calls.call(unspeakable, ())
 
 
-def test_a_call_whose_process_is_killed_is_tried_again_so_many_times(calls: Isolation, tmp_path: Path) -> None:
+def test_a_call_whose_process_is_killed_is_repeated_a_limited_number_of_times(calls: Isolation, tmp_path: Path) -> None:
     with pytest.raises(CallError, match=r"^its process was ended by SIGKILL, 3 times$"):
         calls.call(die, (tmp_path / "begun", 9), retries=2)
     assert (tmp_path / "begun").read_text() == "begun begun begun "
@@ -63,12 +63,12 @@ def test_a_process_that_has_nothing_to_do_gives_its_memory_back(calls: Isolation
     assert calls.call(process, ()) != first
 
 
-def test_what_a_call_prints_does_not_get_into_its_answer() -> None:
+def test_output_of_a_call_is_not_part_of_its_result() -> None:
     run = subprocess.run([sys.executable, "-c", NOISY], capture_output=True, text=True, check=True, cwd=Path(__file__).parents[3])
     assert (run.stdout, run.stderr) == ("quiet\n", "")
 
 
-def test_a_process_ends_in_the_midst_of_its_work_when_the_one_that_asked_is_killed(tmp_path: Path) -> None:
+def test_a_working_process_ends_when_its_caller_is_killed(tmp_path: Path) -> None:
     script = f"from tests.mdp.batch.test_isolation import *; Isolation().call(sleep, (Path({str(tmp_path / 'begun')!r}),))"
     asker = subprocess.Popen([sys.executable, "-c", script], cwd=Path(__file__).parents[3])
     worker = int(begin(tmp_path / "begun.pid"))

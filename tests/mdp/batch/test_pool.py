@@ -34,7 +34,7 @@ def test_one_call_that_dies_each_time_leaves_the_others_alone(tmp_path: Path) ->
     assert (results[0], results[1], str(results[9])) == ("alive", "alive", "its process was ended by SIGKILL, 2 times")
 
 
-def test_what_runs_is_killed_when_the_pool_is_left(tmp_path: Path) -> None:
+def test_running_tasks_are_killed_when_the_pool_is_closed(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt), connected(Workers(None, 1, retries=9)) as queue:
         list(queue.completed(sleep, {"long": (tmp_path / "long",)}, lambda: interrupt_after(tmp_path / "long.pid")))
     with pytest.raises(ProcessLookupError):
@@ -106,7 +106,7 @@ def run_on(address: str, folders: tuple[Path, ...] = ()) -> None:
 
 @pytest.mark.train
 @pytest.mark.slow
-def test_what_a_killed_machine_had_is_done_by_another(scheduler: str, tmp_path: Path) -> None:
+def test_tasks_of_a_killed_machine_are_done_by_another(scheduler: str, tmp_path: Path) -> None:
     first = worker(scheduler, tmp_path)
     killed: list[subprocess.Popen[bytes]] = []
 
@@ -130,7 +130,7 @@ def slow_at_first(note: Path, result: int) -> int:
 
 @pytest.mark.train
 @pytest.mark.slow
-def test_a_worker_that_does_not_see_a_folder_is_told(scheduler: str, tmp_path: Path) -> None:
+def test_a_worker_without_access_to_a_folder_is_reported(scheduler: str, tmp_path: Path) -> None:
     run = worker(scheduler, tmp_path)
     nowhere = tmp_path / "nowhere"
     with pytest.raises(UserError, match=f"cannot work: it does not see {nowhere}$"):

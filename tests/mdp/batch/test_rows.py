@@ -37,7 +37,7 @@ def test_a_last_line_that_was_cut_off_counts_for_nothing(tmp_path: Path) -> None
     assert read_rows(tmp_path / "t.csv", Row) == [Row("a")]
 
 
-def test_where_there_is_no_table_there_are_no_rows(tmp_path: Path) -> None:
+def test_a_missing_table_has_no_rows(tmp_path: Path) -> None:
     assert read_rows(tmp_path / "t.csv", Row) == []
 
 

@@ -129,12 +129,12 @@ def _decompose(mesh: Mesh, *settings_: str) -> Decomposition:
     return decompose(mesh, "shape", load(settings=("search.directions=200", *settings_)))
 
 
-def test_a_cut_whose_seam_is_a_greater_scar_than_it_saves_is_not_made() -> None:
+def test_a_cut_whose_seam_outweighs_its_savings_is_not_made() -> None:
     assert len(_decompose(shapes.branch(), "search.seam_mm=100").parts) == 1
     assert len(_decompose(shapes.branch(), "search.seam_mm=0.6").parts) == 2
 
 
-def test_without_a_width_of_the_seam_the_objective_is_the_paper_s() -> None:
+def test_with_a_seam_width_of_zero_the_objective_is_that_of_the_paper() -> None:
     ours, paper = (_decompose(shapes.tee(), setting) for setting in ("search.seam_mm=0", "search.objective=risky"))
     assert [part.base.offset_mm for part in ours.parts] == [part.base.offset_mm for part in paper.parts]
     assert ours.residual_area_mm2 == paper.residual_area_mm2
@@ -155,7 +155,7 @@ def test_every_row_of_the_front_says_what_its_parts_cost(shape: str) -> None:
 
 @given(st.floats(0.0, 6.28), st.floats(0.3, 1.5), st.floats(-3.0, 3.0))
 @settings(max_examples=20, deadline=None)
-def test_a_piece_lies_on_its_source_and_what_has_none_lies_in_a_cut(turn: float, rise: float, shift_mm: float) -> None:
+def test_a_face_is_on_its_source_face_or_in_a_cut(turn: float, rise: float, shift_mm: float) -> None:
     mesh = shapes.branch()
     solid = solid_of(mesh)
     middle = mesh.bounds_mm.mean(axis=0)

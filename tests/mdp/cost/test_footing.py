@@ -33,7 +33,7 @@ def test_the_tension_under_a_rod_is_that_of_a_push_at_its_top_less_its_weight() 
     assert footing.brimmed_mpa == pytest.approx(60.0 / (np.pi * 1000.0 / 4.0) - pressed_mpa / 4.0, rel=1e-2)
 
 
-def test_a_weight_beside_the_contact_bends_it_too() -> None:
+def test_an_eccentric_weight_also_bends_the_contact() -> None:
     beside_mm = np.array([40.0, 0.0, 30.0])
     straight, leaning = (
         footing_of(rod(5.0, 60.0), density_g_cm3=1.24, **centre).tension_mpa for centre in ({}, {"centre": beside_mm})
@@ -97,13 +97,13 @@ def test_a_table_on_thin_legs_is_held() -> None:
 
 
 @pytest.mark.parametrize("thick_mm", [0.05, 0.1, 0.2])
-def test_a_thin_sheet_stands_on_all_of_its_face(thick_mm: float) -> None:
+def test_a_thin_sheet_has_its_whole_face_as_base(thick_mm: float) -> None:
     footing = standing(m3.Manifold.cube((100.0, 80.0, thick_mm)))
     assert footing.base_share > 0.99
     assert footing.held()
 
 
-def test_what_leans_out_over_its_base_is_held_as_far_as_glue_and_brim_reach() -> None:
+def test_a_body_leaning_over_its_base_is_held_by_adhesion_and_brim() -> None:
     assert standing(balanced(5.0, 3.0)).held()
     assert not standing(balanced(5.0, 14.0)).held()
 
@@ -122,7 +122,7 @@ def test_a_rounded_end_is_as_wide_as_a_hundredth_of_the_model_above_the_plate() 
     assert footing.base_share == pytest.approx(section_mm2 / (np.pi * 81.0), rel=0.05)
 
 
-def test_a_point_is_no_base_and_the_file_is_believed_no_further_than_it_stands() -> None:
+def test_a_point_is_not_a_base() -> None:
     assert not standing(m3.Manifold.cylinder(40.0, 0.01, 20.0, 64)).held(of_file=True)
 
 
@@ -156,7 +156,7 @@ def test_the_hull_bounds_what_touches_and_how_far_a_model_may_lean(seed: int) ->
 
 
 @pytest.mark.parametrize("setting", ["process.raft_layers=3", "search.pedestal_mm=5"])
-def test_no_brim_holds_what_stands_on_a_raft_or_a_pedestal(setting: str) -> None:
+def test_no_brim_is_assumed_on_a_raft_or_a_pedestal(setting: str) -> None:
     mesh = mesh_of(rod(5.0, 60.0))
     footing = BuildPlate.under(mesh, load(settings=[setting, "process.brim_mm=10"])).footing(UPRIGHT)
     assert footing.brimmed_mpa == pytest.approx(footing.tension_mpa)

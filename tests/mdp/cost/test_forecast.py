@@ -114,7 +114,7 @@ def test_forecast_front_and_parts_agree_on_what_a_cut_leaves(lean: float) -> Non
     assert Forecast.of(problem.root.remainder, problem.terms).left_mm2([plane]) == pytest.approx(node.cost_mm2, rel=1e-6)
 
 
-def test_what_is_over_air_costs_so_many_times_its_area_and_counts_once_in_what_needs_support() -> None:
+def test_area_over_air_costs_a_multiple_and_counts_once_as_needing_support() -> None:
     plane = Plane(np.array([0.5, 0.0, np.sqrt(0.75)]), 12.4)
     rows = []
     for weight in (1.0, 5.0):

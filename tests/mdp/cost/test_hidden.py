@@ -23,7 +23,7 @@ def _between(mesh: Mesh, low_mm: float, high_mm: float) -> Floats:
     return hidden_shares(mesh)[(z.min(axis=1) > low_mm) & (z.max(axis=1) < high_mm)]
 
 
-def test_nothing_of_a_box_or_a_ball_is_hidden() -> None:
+def test_no_face_of_a_box_or_ball_is_hidden() -> None:
     for mesh in (shapes.box(), mesh_of(m3.Manifold.sphere(10.0, 64))):
         assert hidden_shares(mesh).max() == pytest.approx(0.0, abs=1e-9)
 

@@ -18,13 +18,13 @@ def _arms(other_mm: float) -> Mesh:
 
 
 @pytest.mark.parametrize(("other_mm", "across_x"), [(30.0, True), (30.5, True), (22.0, False)])
-def test_a_model_is_symmetric_where_its_mirror_image_lies_on_it(other_mm: float, across_x: bool) -> None:
+def test_a_model_is_symmetric_if_it_equals_its_mirror_image(other_mm: float, across_x: bool) -> None:
     normals = np.abs([mirror.normal for mirror in find_mirrors(_arms(other_mm))])
     assert normals[:, 1].max() == pytest.approx(1.0)  # front and back always mirror each other
     assert (normals[:, 0].max() > 0.999) == across_x
 
 
-def test_a_plane_is_its_image_s_image_and_an_upright_one_its_own() -> None:
+def test_mirroring_a_plane_twice_gives_it_back() -> None:
     mirror = Mirror(np.array([1.0, 0.0, 0.0]), 3.0)
     plane, middle = Plane(np.array([0.1, 0.0, 0.99**0.5]), 7.0), np.array([5.0, 2.0, 1.0])
     twice = mirror.image(mirror.image(plane))

@@ -42,7 +42,7 @@ def test_a_model_that_is_turned_has_its_directions_turned(x: float, y: float, z:
     assert same(Flats.of(mesh.transform(turn)).directions(-1.0), Flats.of(mesh).directions(-1.0) @ turn.T)
 
 
-def test_a_ball_has_none() -> None:
+def test_a_ball_has_no_flats() -> None:
     assert len(Flats.of(mesh_of(m3.Manifold.sphere(10.0, 64))).shares) == 0
 
 
@@ -52,7 +52,7 @@ def test_no_direction_is_within_half_a_degree_of_another() -> None:
     assert between.min() >= 0.5
 
 
-def test_beside_a_direction_are_those_along_more_flats_the_one_along_most_of_all_first() -> None:
+def test_directions_near_a_given_one_are_ranked_by_their_flats() -> None:
     flats = Flats.of(shapes.box(10, 20, 30))
     askew = about(np.array([0.0, 1.0, 0.0]), 0.1) @ about(np.array([0.0, 0.0, 1.0]), 0.1) @ np.array([1.0, 0.0, 0.0])
     first, *others = flats.beside(askew, -1.0)

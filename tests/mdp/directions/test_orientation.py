@@ -30,13 +30,13 @@ def set_down(mesh: Mesh, rotation: object) -> Mesh:
     return turned.transform(np.eye(3), (0.0, 0.0, -turned.bounds_mm[0, 2]))
 
 
-def test_a_box_stays_as_it_stands() -> None:
+def test_a_box_keeps_its_orientation() -> None:
     best = best_orientation(box(20, 30, 40), ANGLE_DEG)
     assert np.allclose(best.rotation, np.eye(3))
     assert (best.risky_mm2, best.stable) == (0.0, True)
 
 
-def test_a_tee_lies_on_its_side() -> None:
+def test_a_tee_is_laid_on_its_side() -> None:
     best = best_orientation(tee(), ANGLE_DEG)
     assert best.turns_deg == pytest.approx((90.0, 0.0))
     assert best.risky_mm2 == 0.0
@@ -69,7 +69,7 @@ def test_the_least_risky_come_first() -> None:
     assert [orientation.rotation.tobytes() for orientation in resting] == again
 
 
-def test_what_only_a_raft_could_hold_is_looked_at_when_asked() -> None:
+def test_orientations_that_need_a_raft_are_tried_on_request() -> None:
     assert best_orientation(hollow(), ANGLE_DEG).risky_mm2 == pytest.approx(100.0)
     balanced = best_orientation(hollow(), ANGLE_DEG, resting=False)
     assert (balanced.risky_mm2, balanced.stable) == (0.0, False)
@@ -117,7 +117,7 @@ def test_one_direction_is_what_brute_force_gives(vector: tuple[float, float, flo
     assert face_areas(mesh, up[None], ANGLE_DEG)[0, RISKY] == pytest.approx(risky, abs=1e-9)
 
 
-def test_what_is_known_of_a_mesh_is_worked_out_once_and_keeps_the_mesh_from_nobody() -> None:
+def test_cached_values_of_a_mesh_are_computed_once_and_do_not_keep_it_alive() -> None:
     mesh = tee()
     assert best_orientation(mesh, ANGLE_DEG) is best_orientation(mesh, ANGLE_DEG)
     assert best_orientation(mesh, ANGLE_DEG) is not best_orientation(tee(), ANGLE_DEG)
@@ -170,7 +170,7 @@ def test_the_azimuth_turns_with_a_model_of_no_symmetry(turn_deg: float) -> None:
 
 @pytest.mark.parametrize("corners", [2, 3, 4, 5, 6])
 @given(turn_deg=ANY_DEG)
-def test_of_a_model_that_looks_the_same_from_several_sides_it_is_one_of_these(corners: int, turn_deg: float) -> None:
+def test_one_of_several_symmetric_orientations_is_chosen(corners: int, turn_deg: float) -> None:
     assert apart_deg(azimuth_deg(star(corners), turn_deg), turn_deg, 360.0 / corners) < 1e-4
 
 

@@ -27,7 +27,9 @@ def turned(name: str, rotation: np.ndarray | None = None) -> Mesh:
 
 @settings(max_examples=20, deadline=None)
 @given(st.sampled_from(sorted(PROFILES)), vectors, st.floats(0.0, 6.3))
-def test_the_axis_of_a_turned_body_is_found_however_it_lies(name: str, vector: tuple[float, ...], angle_rad: float) -> None:
+def test_the_axis_of_a_body_of_revolution_is_found_in_any_rotation(
+    name: str, vector: tuple[float, ...], angle_rad: float
+) -> None:
     rotation = about(unit(vector), angle_rad)
     found = find_revolution(turned(name, rotation))
     assert found is not None
@@ -46,11 +48,11 @@ def test_a_handle_does_not_hide_the_axis_of_a_mug() -> None:
 
 
 @pytest.mark.parametrize("mesh", [box(20, 30, 40), box(60, 60, 3), tee(), ball()], ids=["box", "plate", "tee", "ball"])
-def test_what_is_not_turned_has_no_axis(mesh: Mesh) -> None:
+def test_other_bodies_have_no_axis_of_revolution(mesh: Mesh) -> None:
     assert find_revolution(mesh) is None
 
 
-def test_an_axis_is_square_to_what_lies_along_or_across_it() -> None:
+def test_an_axis_is_aligned_with_faces_along_or_across_it() -> None:
     found = find_revolution(turned("a vase"))
     assert found is not None
     answers = [found.is_square_to(unit(direction)) for direction in ((0, 0, -1), (1, 2, 0), (0.07, 0, 1), (0.1, 0, 1), (1, 0, 1))]

@@ -40,7 +40,7 @@ def moved(solid: m3.Manifold, linear: Floats) -> Mesh:
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-def test_volumes_that_are_not_printed_become_marks_where_they_lie_in_the_model(tmp_path: Path, dialect: str) -> None:
+def test_volumes_that_are_not_printed_become_marks_at_their_place(tmp_path: Path, dialect: str) -> None:
     leaning = BOX.rotate((20.0, 30.0, 40.0)).translate((4.0, 5.0, 6.0))
     volumes = [Made(BLOCK), Made(leaning, "support"), Made(CYLINDER, "no_support"), Made(BOX, "support")]
     model = read_model(written(tmp_path / "a.3mf", dialect, [Object(volumes, [AT_ORIGIN])]), 2.0, (90.0, 0.0, 0.0))
@@ -68,7 +68,7 @@ def test_volumes_that_are_not_printed_become_marks_where_they_lie_in_the_model(t
 
 @pytest.mark.parametrize("turn_deg", [(0.0, 0.0, 0.0), (20.0, 30.0, 40.0)])
 @pytest.mark.parametrize("corner_mm", [(4.9, 3.9, 4.9), (5.0, 4.0, 0.0), (2.0, 4.0, 5.0)])
-def test_a_modifier_of_eight_corners_that_is_no_box_keeps_its_own_shape(
+def test_a_modifier_of_eight_corners_that_is_not_a_box_keeps_its_shape(
     tmp_path: Path, corner_mm: tuple[float, float, float], turn_deg: tuple[float, float, float]
 ) -> None:
     corners = [*product((-5.0, 5.0), (-4.0, 4.0), (-5.0, 5.0))]
@@ -167,7 +167,7 @@ def test_a_height_range_ends_just_above_its_object_and_one_that_holds_nothing_is
     np.testing.assert_allclose(sizes, np.sort([32.0, 32.0, span_mm[1] - span_mm[0]]), atol=1e-9)
 
 
-def test_a_modifier_holds_for_its_own_object_alone(tmp_path: Path) -> None:
+def test_a_modifier_applies_only_to_its_own_object(tmp_path: Path) -> None:
     beside = Placed(np.vstack([np.eye(3), [40.0, 0.0, 10.0]]))
     wide = m3.Manifold.cube((100.0, 5.0, 5.0), True)
     objects = [Object([Made(BLOCK), Made(wide, "modifier", {"perimeters": "4"})], [AT_ORIGIN]), Object([Made(BLOCK)], [beside])]
@@ -210,7 +210,7 @@ def test_a_mark_that_is_no_solid_is_left_out_with_a_note(tmp_path: Path) -> None
     ("dialect", "supports", "seams"),
     [("prusaslicer", "slic3rpe:custom_supports", "slic3rpe:custom_seam"), ("bambu", "paint_supports", "paint_seam")],
 )
-def test_triangles_that_are_painted_on_more_than_half_are_marked_wherever_the_model_lies(
+def test_triangles_painted_on_more_than_half_are_marked_in_any_placement(
     tmp_path: Path, dialect: str, supports: str, seams: str
 ) -> None:
     path = written(tmp_path / "a.3mf", dialect, [Object([Made(BLOCK)], [AT_ORIGIN])])
@@ -272,7 +272,7 @@ def test_paint_on_nothing_that_is_printed_is_left_out_with_a_note(tmp_path: Path
     assert "paint against seams is left out: its 1 triangle is not on the surface of what is printed" in model.notes
 
 
-def test_what_is_said_of_many_volumes_is_said_once(tmp_path: Path) -> None:
+def test_a_note_about_many_volumes_is_given_once(tmp_path: Path) -> None:
     volumes = [Made(BLOCK), *(Made(BOX.translate((0.0, 0.0, 4.0 * k)), "negative") for k in range(3))]
     blockers = [Made(BOX, "no_support")] * 3
     objects = [Object([*volumes, *blockers], [AT_ORIGIN], {"wall_generator": "arachne"})]

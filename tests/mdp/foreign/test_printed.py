@@ -48,7 +48,7 @@ def drawn(rng: np.random.Generator, plates: int) -> list[Object]:
 
 @pytest.mark.parametrize("dialect", DIALECTS)
 @pytest.mark.parametrize("seed", range(30))
-def test_what_is_read_is_what_the_slicer_file_was_made_of(tmp_path: Path, dialect: str, seed: int) -> None:
+def test_the_model_read_equals_the_contents_of_the_slicer_file(tmp_path: Path, dialect: str, seed: int) -> None:
     rng = np.random.default_rng([seed, len(dialect)])
     plates = int(rng.integers(1, 4)) if dialect == "bambu" else 1
     objects = drawn(rng, plates)
@@ -74,7 +74,7 @@ def test_a_negative_volume_takes_nothing_out_of_another_object(tmp_path: Path) -
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
-def test_what_lies_below_the_plate_of_a_slicer_file_is_not_printed(tmp_path: Path, dialect: str) -> None:
+def test_bodies_below_the_plate_of_a_slicer_file_are_not_printed(tmp_path: Path, dialect: str) -> None:
     sunk = Placed(np.vstack([np.eye(3), [0.0, 0.0, 6.0]]))
     model = read_model(written(tmp_path / "a.3mf", dialect, [Object([Made(BLOCK), Made(BOX, "support")], [sunk])]))
     check(model.mesh, BLOCK.trim_by_plane((0.0, 0.0, 1.0), -6.0))

@@ -105,7 +105,7 @@ def test_the_faces_of_an_iges_solid_are_sewn_and_read_in_mm(tmp_path: Path, unit
     assert_closed(mesh)
 
 
-def test_an_assembly_is_told_by_the_names_of_its_parts_and_so_is_one_that_is_open() -> None:
+def test_an_assembly_is_reported_with_the_names_of_its_parts() -> None:
     boxes = [
         replace(boxed(files.placed(10, 10, 10, (20.0 * k, 0, 0))), name=name) for k, name in enumerate(("nut", "nut", "rod"))
     ]
@@ -122,9 +122,7 @@ def test_a_step_file_that_was_cut_off_is_refused(tmp_path: Path, share: float) -
     assert "STEP" in refusal(save(tmp_path / "cut.step", whole[: int(share * len(whole))]))
 
 
-def test_a_damaged_step_file_ends_in_a_sentence_and_nothing_is_said_beside_it(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_damaged_step_file_is_refused_in_one_sentence(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("cascadio")
     half = step_box((20, 30, 40)).encode()[:3000]
     assert refusal(save(tmp_path / "half.stp", half)) == "is not a valid STEP file"
@@ -132,7 +130,7 @@ def test_a_damaged_step_file_ends_in_a_sentence_and_nothing_is_said_beside_it(
     assert capfd.readouterr() == ("", "")
 
 
-def test_a_step_file_that_ends_the_cad_library_by_a_signal_is_refused_and_this_process_goes_on(tmp_path: Path) -> None:
+def test_a_step_file_that_crashes_the_cad_library_is_refused(tmp_path: Path) -> None:
     pytest.importorskip("cascadio")
     damaged = step_box((20, 30, 40)).replace("=DIRECTION(", "=DIRECTOR(")
     assert refusal(save(tmp_path / "box.step", damaged.encode())) == DAMAGED

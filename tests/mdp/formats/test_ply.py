@@ -44,7 +44,7 @@ def test_a_binary_ply_may_mix_triangles_and_quads_and_carry_other_tables(tmp_pat
     assert (mesh.volume_mm3, len(mesh.faces), len(notes)) == (pytest.approx(729), 12, 1)  # the note reports its size
 
 
-def test_the_numbers_of_an_ascii_ply_may_stand_in_any_lines(tmp_path: Path) -> None:
+def test_the_numbers_of_an_ascii_ply_may_be_on_any_lines(tmp_path: Path) -> None:
     header, _, body = files.ply(tee()).partition(b"end_header\n")
     mesh, _ = read_mesh(save(tmp_path / "a.ply", header + b"end_header\n\n" + body.replace(b" ", b"\n")))
     assert mesh.volume_mm3 == pytest.approx(tee().volume_mm3)

@@ -78,7 +78,7 @@ def test_blanks_comments_and_other_lines_change_nothing(tmp_path: Path, old: str
     assert (changed.vertices.tobytes(), changed.faces.tobytes()) == (plain.vertices.tobytes(), plain.faces.tobytes())
 
 
-def test_negative_indices_count_from_the_line_they_stand_in(tmp_path: Path) -> None:
+def test_negative_indices_count_from_their_line(tmp_path: Path) -> None:
     boxes = [files.placed(10, 10, 10), files.placed(10, 10, 10, (20, 0, 0))]
     rows = ["".join(f"v {x} {y} {z}\n" for x, y, z in box.vertices) + _faces((box.faces - 8).tolist()) for box in boxes]
     mesh, notes = read_mesh(save(tmp_path / "a.obj", "".join(rows).encode()))

@@ -46,7 +46,7 @@ def test_a_sound_mesh_keeps_its_faces_and_places(tmp_path: Path, suffix: str) ->
 
 
 @pytest.mark.parametrize("suffix", FORMATS)
-def test_files_of_an_independent_writer_read_alike(tmp_path: Path, suffix: str) -> None:
+def test_files_of_an_independent_writer_are_read_the_same(tmp_path: Path, suffix: str) -> None:
     trimesh = pytest.importorskip("trimesh")
     path = tmp_path / f"ball{suffix}"
     trimesh.Trimesh(ball().vertices, ball().faces, process=False).export(path)

@@ -32,7 +32,7 @@ def dae(asset: str) -> bytes:
     return DAE.format(asset=asset, positions=positions, corners=corners).encode()
 
 
-def test_a_gltf_with_its_buffers_beside_it_is_read_as_a_glb_is(tmp_path: Path) -> None:
+def test_a_gltf_with_buffer_files_is_read_like_a_glb(tmp_path: Path) -> None:
     box = trimesh.creation.box((20, 30, 40))
     for name, content in export_gltf(trimesh.Scene({"a": box})).items():
         (tmp_path / name).write_bytes(content)
@@ -49,7 +49,7 @@ def test_a_gltf_that_requires_an_extension_that_is_not_read_is_refused_by_its_na
     assert sentence == "requires EXT_meshopt_compression, a glTF extension that is not read: export it without"
 
 
-def test_what_the_nodes_mirror_and_move_is_read_so(tmp_path: Path) -> None:
+def test_transformations_of_nodes_are_applied(tmp_path: Path) -> None:
     mirrored = np.diag([-1.0, 1.0, 1.0, 1.0])
     mirrored[0, 3] = 60.0
     scene = trimesh.Scene({"a": trimesh.creation.box((20, 30, 40))})
@@ -79,14 +79,14 @@ def test_a_gltf_without_its_buffers_or_of_nothing_ends_in_a_sentence(tmp_path: P
         ('<unit name="millimeter" meter="0.001"/><up_axis>Y_UP</up_axis>', (20, 40, 30)),
     ],
 )
-def test_collada_tells_its_unit_and_its_upward_axis(tmp_path: Path, asset: str, sides_mm: tuple[float, ...]) -> None:
+def test_unit_and_up_axis_of_collada_are_applied(tmp_path: Path, asset: str, sides_mm: tuple[float, ...]) -> None:
     pytest.importorskip("collada")
     mesh, notes = read_mesh(save(tmp_path / "a.dae", dae(asset)))
     assert notes == ()
     assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx(sides_mm)
 
 
-def test_what_is_up_in_collada_stays_up_and_nothing_is_mirrored(tmp_path: Path) -> None:
+def test_the_up_axis_of_collada_stays_up_without_mirroring(tmp_path: Path) -> None:
     pytest.importorskip("collada")
     (plain,) = read(save(tmp_path / "a.dae", dae("<up_axis>Z_UP</up_axis>")))
     for up, axis in enumerate(("X_UP", "Y_UP", "Z_UP")):
@@ -104,7 +104,7 @@ def test_what_is_up_in_collada_stays_up_and_nothing_is_mirrored(tmp_path: Path) 
         ("<up_axis>UP</up_axis>", "its <up_axis> is 'UP', it must be one of X_UP, Y_UP, Z_UP"),
     ],
 )
-def test_a_unit_or_an_axis_that_is_none_is_refused(tmp_path: Path, asset: str, sentence: str) -> None:
+def test_an_invalid_unit_or_axis_is_refused(tmp_path: Path, asset: str, sentence: str) -> None:
     pytest.importorskip("collada")
     assert sentence in refusal(save(tmp_path / "a.dae", dae(asset)))
 

@@ -69,7 +69,7 @@ def test_cura_says_in_an_object_s_metadata_what_it_is(tmp_path: Path, mesh: str,
     assert kind != "modifiers" or zone.process == {"infill_density": 0.45}
 
 
-def test_the_family_of_readers_tells_parts_of_a_slicer_file_from_negative_volumes(tmp_path: Path) -> None:
+def test_parts_of_a_slicer_file_are_distinguished_from_negative_volumes(tmp_path: Path) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK), Made(BOX, "negative")], [AT_ORIGIN])])
     (built,) = READERS[".3mf"](path, None).objects
     assert [role.kind for _, role in built.volumes] == ["part", "negative volume"]
@@ -133,7 +133,7 @@ def test_a_damaged_slicer_file_is_refused_with_a_sentence(tmp_path: Path, part: 
     assert words in files.refusal(path)
 
 
-def test_colours_painted_on_triangles_are_told(tmp_path: Path) -> None:
+def test_colours_painted_on_triangles_are_reported(tmp_path: Path) -> None:
     path = prusaslicer(tmp_path / "a.3mf", [Object([Made(BLOCK)], [AT_ORIGIN])])
     change(path, "3D/3dmodel.model", "<triangle ", '<triangle slic3rpe:mmu_segmentation="4" paint_seam="8" ')
     model = read_model(path)
@@ -144,7 +144,7 @@ def test_colours_painted_on_triangles_are_told(tmp_path: Path) -> None:
     )
 
 
-def test_a_file_that_keeps_nothing_but_g_code_says_so(tmp_path: Path) -> None:
+def test_a_file_with_only_g_code_is_refused_with_that_reason(tmp_path: Path) -> None:
     path = bambu(tmp_path / "a.3mf", [], np.random.default_rng(0), {"Metadata/plate_1.gcode": "G1 X1\n"})
     with pytest.raises(
         MeshError, match="its build places no mesh, it keeps nothing but G-code of a sliced plate: save the project"

@@ -27,7 +27,7 @@ def test_a_truncated_stl_says_how_many_facets_it_holds(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("count", [b"\0\0\0\0", b"\xff\xff\xff\xff"])
-def test_the_size_of_a_binary_stl_tells_how_many_facets_it_has_where_its_count_does_not(tmp_path: Path, count: bytes) -> None:
+def test_the_file_size_of_a_binary_stl_replaces_a_wrong_facet_count(tmp_path: Path, count: bytes) -> None:
     content = files.stl(tee())
     mesh, _ = read_mesh(save(tmp_path / "a.stl", content[:80] + count + content[84:]))
     assert mesh.volume_mm3 == pytest.approx(tee().volume_mm3)

@@ -133,7 +133,7 @@ SLICE = 'xmlns:s="http://schemas.microsoft.com/3dmanufacturing/slice/2015/07"'
         ({"<model ": '<model requiredextensions="p" '}, {}),
     ],
 )
-def test_what_programs_write_otherwise_is_read_the_same(tmp_path: Path, changes: dict[str, str], names: dict[str, str]) -> None:
+def test_variants_of_other_programs_are_read_the_same(tmp_path: Path, changes: dict[str, str], names: dict[str, str]) -> None:
     mesh, notes = read_mesh(_rewritten(tmp_path / "a.3mf", changes, names))
     assert (mesh.volume_mm3, notes) == (pytest.approx(6000), ())
     assert np.ptp(mesh.bounds_mm, axis=0).tolist() == [10, 20, 30]
@@ -148,5 +148,7 @@ def test_what_programs_write_otherwise_is_read_the_same(tmp_path: Path, changes:
         ({"</model>": ""}, "its part 3D/a.model is missing or malformed"),
     ],
 )
-def test_what_changes_the_shape_and_is_not_read_is_refused_by_name(tmp_path: Path, changes: dict[str, str], words: str) -> None:
+def test_unsupported_elements_that_change_the_shape_are_refused_by_name(
+    tmp_path: Path, changes: dict[str, str], words: str
+) -> None:
     assert words in refusal(_rewritten(tmp_path / "a.3mf", changes))

@@ -21,7 +21,7 @@ def test_a_kernel_is_compiled_once_and_again_when_a_part_or_a_constant_in_anothe
     assert result_and_compilations(program) == "22.0 1"
 
 
-def test_a_kernel_whose_file_was_not_written_to_its_end_is_compiled_again(program: Path) -> None:
+def test_a_kernel_with_a_truncated_file_is_compiled_again(program: Path) -> None:
     result_and_compilations(program)
     [file] = (program.parent.parent / "cached").rglob("*.nbc")
     file.write_bytes(b"")
@@ -65,7 +65,7 @@ def test_a_kernel_that_cannot_be_cached_works_and_the_reason_is_noted(tmp_path: 
     assert done.stdout == f"21.0 {tmp_path / 'cached'} cannot be written: no space left on device\n"
 
 
-def test_a_cache_that_is_no_folder_is_not_replaced_by_one_beside_the_source(
+def test_an_invalid_cache_folder_is_not_replaced_by_one_beside_the_source(
     tmp_path: Path, program: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").write_text("")
@@ -83,7 +83,7 @@ COMPILED = (
 )
 
 
-def test_nothing_that_only_compiling_needs_is_imported_or_compiled_for_a_cached_kernel(program: Path) -> None:
+def test_a_cached_kernel_imports_and_compiles_nothing(program: Path) -> None:
     assert [output_of(program, COMPILED), output_of(program, COMPILED)] == ["21.0 True True", "21.0 False False"]
 
 

@@ -57,12 +57,12 @@ def test_two_pieces_are_done_in_two_processes_at_once() -> None:
     assert len(set(parallel_map(lambda k: meet(*ends[k]), 2))) == 2
 
 
-def test_the_first_error_in_order_is_raised_whoever_meets_it() -> None:
+def test_the_first_error_in_order_is_raised_whichever_process_meets_it() -> None:
     with pytest.raises(ValueError, match=r"^piece 1$"):
         list(parallel_map(lambda k: fail(k) if k else square(k), 30))
 
 
-def test_what_a_killed_process_leaves_undone_is_done_here() -> None:
+def test_the_work_of_a_killed_process_is_done_by_its_parent() -> None:
     assert list(parallel_map(killed_elsewhere, 20)) == [k * k for k in range(20)]
 
 
@@ -101,7 +101,7 @@ def test_few_pieces_are_not_worth_a_copy() -> None:
     assert set(parallel_map(pid, 9, fewest=10)) == {HERE}
 
 
-def test_where_no_process_can_be_had_this_one_does_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_other_processes_this_one_does_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse() -> int:
         raise BlockingIOError(11, "Resource temporarily unavailable")
 
@@ -132,7 +132,7 @@ def test_a_thread_that_is_not_the_main_one_forks_nothing() -> None:
     assert threads.ahead(lambda: set(parallel_map(pid, 9))).result() == {HERE}
 
 
-def test_our_own_threads_have_done_what_they_had_to_do_and_are_gone_when_a_copy_is_made() -> None:
+def test_own_threads_have_finished_before_a_fork() -> None:
     finished: list[int] = []
     slow = threads.ahead(lambda: (time.sleep(0.3), threads.in_threads(lambda begin, end: finished.append(begin), 12)))
     alive = set(parallel_map(lambda number: (len(finished), threading.active_count()), 3, helps=False))
@@ -215,7 +215,7 @@ list(parallel_map(work, 2))
 
 
 @pytest.mark.parametrize("ended_by", [signal.SIGINT, signal.SIGTERM, signal.SIGKILL])
-def test_whatever_ends_the_parent_ends_its_copies(ended_by: signal.Signals) -> None:
+def test_any_end_of_the_parent_ends_its_forks(ended_by: signal.Signals) -> None:
     with subprocess.Popen([sys.executable, "-c", WORKING], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as parent:
         assert parent.stdout is not None
         working = [int(parent.stdout.readline()) for _ in range(2)]

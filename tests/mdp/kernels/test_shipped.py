@@ -50,7 +50,7 @@ def test_it_is_used_by_a_link_to_the_program(shipped: Path, tmp_path: Path) -> N
     assert result_and_compilations(tmp_path / "link" / "mdp") == "21.0 0"
 
 
-def test_where_a_part_or_a_constant_in_another_file_differs_it_is_compiled(shipped: Path, tmp_path: Path) -> None:
+def test_a_changed_dependency_in_another_file_causes_compilation(shipped: Path, tmp_path: Path) -> None:
     (shipped / "far.py").write_text(PART_FILE.replace("10.0", "20.0"), encoding="utf-8")
     assert result_and_compilations(shipped) == "41.0 1"
     (shipped / "far.py").write_text(PART_FILE.replace("PART = 1.0", "PART = 2.0"), encoding="utf-8")
@@ -64,11 +64,11 @@ def test_for_another_processor_it_is_compiled(shipped: Path, tmp_path: Path) -> 
 
 
 @pytest.mark.parametrize("library", ["numba", "llvmlite"])
-def test_with_another_version_of_what_compiles_it_is_compiled(shipped: Path, library: str) -> None:
+def test_another_compiler_version_causes_compilation(shipped: Path, library: str) -> None:
     assert result_and_compilations(shipped, f"import numba, {library}; {library}.__version__ += '.1'") == "21.0 1"
 
 
-def test_with_another_python_it_is_compiled(shipped: Path) -> None:
+def test_another_python_version_causes_compilation(shipped: Path) -> None:
     assert result_and_compilations(shipped, "import sys, numba; sys.implementation.cache_tag = 'cpython-310'") == "21.0 1"
 
 
@@ -85,7 +85,7 @@ def test_for_other_arguments_it_is_compiled_into_the_user_s_folder_and_what_was_
     assert result_and_compilations(shipped, "from mdp.near import near; near(1)") == "21.0 0"
 
 
-def test_who_can_write_no_folder_loses_nothing_where_all_was_shipped(shipped: Path, tmp_path: Path) -> None:
+def test_shipped_kernels_need_no_writable_folder(shipped: Path, tmp_path: Path) -> None:
     (tmp_path / "cached").write_text("")
     code = "from mdp.near import near; from mdp.kernels import cache; print(near(2.0), cache.is_cached(''), [cache.trouble()])"
     done = subprocess.run([sys.executable, "-c", code], cwd=shipped.parent, capture_output=True, text=True, check=True)

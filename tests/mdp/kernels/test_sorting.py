@@ -64,7 +64,7 @@ def test_comparison_sorts_order_as_numpy_does(numbers: list[int]) -> None:
 
 @settings(deadline=None)
 @given(NUMBERS, st.integers(-1, 10))
-def test_a_rank_counts_what_lies_below_with_or_without_equals(numbers: list[int], x: int) -> None:
+def test_a_rank_counts_smaller_values_with_or_without_equal_ones(numbers: list[int], x: int) -> None:
     rising = np.sort(np.array(numbers, np.float64))
     assert rank(rising, float(x), False) == (rising < x).sum()
     assert rank(rising, float(x), True) == (rising <= x).sum()

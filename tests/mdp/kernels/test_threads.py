@@ -22,7 +22,7 @@ def test_every_row_is_given_out_once_with_all_arguments(cores: int, count: int, 
     assert seen.tolist() == [3] * count
 
 
-def test_what_goes_wrong_in_a_thread_reaches_the_one_who_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_in_a_thread_is_raised_by_the_caller(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(threads, "THREADS", 4)
 
     def fail(begin: int, end: int) -> None:
@@ -33,7 +33,7 @@ def test_what_goes_wrong_in_a_thread_reaches_the_one_who_asked(monkeypatch: pyte
         threads.in_threads(fail, 16)
 
 
-def test_work_begun_ahead_is_there_when_it_is_asked_for() -> None:
+def test_work_begun_in_advance_is_done_when_requested() -> None:
     assert [threads.ahead(pow, 2, k).result() for k in range(5)] == [1, 2, 4, 8, 16]
 
 

@@ -30,14 +30,14 @@ def test_a_pipe_that_ends_at_any_byte_of_a_frame_is_at_its_end() -> None:
 
 
 @pytest.mark.parametrize("content", [b"rubbish", pickle.dumps(1)[:-1], b"cno_such_module\nthing\n."])
-def test_a_frame_that_cannot_be_read_is_the_end_for_nobody_speaks_to_the_process_any_more(content: bytes) -> None:
+def test_an_unreadable_frame_ends_the_worker(content: bytes) -> None:
     told: list[object] = []
     with pytest.raises((pickle.UnpicklingError, EOFError, ImportError)):
         listen(BytesIO(LENGTH.pack(len(content)) + content + frame(WHOLE)), told.append, lambda: told.append("the end"))
     assert told == ["the end"]
 
 
-def test_a_worker_whose_asker_dies_in_the_middle_of_a_call_s_frame_ends_at_once() -> None:
+def test_a_worker_ends_at_once_if_its_caller_dies_while_sending() -> None:
     call = frame(pickle.dumps((greet, ("world",))))
     workers = [Worker() for _ in range(4)]
     for worker, sent in zip(workers, (0, LENGTH.size, LENGTH.size + 1, len(call) - 1), strict=True):
@@ -45,7 +45,7 @@ def test_a_worker_whose_asker_dies_in_the_middle_of_a_call_s_frame_ends_at_once(
         assert worker.process.returncode == -signal.SIGKILL
 
 
-def test_what_a_call_tells_comes_before_what_it_returns() -> None:
+def test_progress_of_a_call_arrives_before_its_result() -> None:
     worker = Worker()
     assert list(worker.ask(squares, 3)) == [(False, 0), (False, 1), (False, 4), (True, "all")]
     assert list(worker.ask("tests.mdp.batch.calls:greet", "world")) == [(True, "hello world")]
@@ -63,7 +63,7 @@ def test_a_worker_that_is_ended_is_gone_and_its_call_without_a_result(tmp_path: 
         worker.call(process)
 
 
-def test_what_a_process_has_started_ends_with_it() -> None:
+def test_child_processes_of_a_worker_end_with_it() -> None:
     started = Interpreter("import os, time; from mdp.kernels.workers import frame; copy = os.fork()\n"
                           "if copy: os.write(1, frame(copy))\ntime.sleep(60)")  # fmt: skip
     copy = next(started.hear())
@@ -84,7 +84,7 @@ def test_a_process_that_leads_no_session_is_ended_without_the_one_that_has_start
     assert alone.process.returncode == -signal.SIGKILL
 
 
-def test_a_worker_that_was_asked_nothing_for_long_is_not_asked_again_and_ends() -> None:
+def test_an_idle_worker_ends_and_is_not_used_again() -> None:
     worker = Worker(idle_s=0.2)
     assert worker.call(greet, "world") == "hello world"
     assert worker.ready
@@ -93,7 +93,7 @@ def test_a_worker_that_was_asked_nothing_for_long_is_not_asked_again_and_ends() 
     assert worker.process.wait(timeout=20.0) == -signal.SIGKILL
 
 
-def test_what_lies_in_the_working_folder_is_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_in_the_working_folder_are_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "queue.py").write_text("raise ValueError")
     monkeypatch.chdir(tmp_path)
     assert Worker().call(greet, "world") == "hello world"

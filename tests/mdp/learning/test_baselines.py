@@ -39,13 +39,13 @@ def test_the_fitted_trade_off_finds_the_weight_that_the_outcomes_were_drawn_with
     assert weight == pytest.approx(0.5, abs=0.1)
 
 
-def test_what_is_saved_alone_orders_worse_than_less_what_is_lost() -> None:
+def test_savings_alone_rank_worse_than_savings_minus_losses() -> None:
     assert mean_ndcg("random") < mean_ndcg("M2") < mean_ndcg("M2 - lambda M6")
 
 
 @pytest.mark.train
 @pytest.mark.parametrize("name", ["RankNet", "RankNet (tuned)", "LambdaRank", "LambdaRank (tuned)"])
-def test_boosted_trees_learn_the_order_and_learn_it_alike_again(name: str) -> None:
+def test_boosted_trees_learn_the_order_deterministically(name: str) -> None:
     pytest.importorskip("xgboost", reason="the extra `train` is not installed")
     assert mean_ndcg("random") + 0.2 < mean_ndcg(name) < 1
     again = [BASELINES[name](TRAINING, VALIDATION, PAPER_COLUMNS)(TEST[0]).tolist() for _ in range(2)]

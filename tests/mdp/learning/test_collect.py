@@ -26,7 +26,7 @@ def _models(folder: Path, **meshes: Mesh) -> Path:
     return folder
 
 
-def test_what_is_done_is_not_done_again_and_what_is_missing_comes_out_the_same_on_fewer_workers(
+def test_only_missing_records_are_collected_with_the_same_result_on_fewer_workers(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     models, out = _models(tmp_path / "models", tee=shapes.tee(), flat=shapes.box()), tmp_path / "out"

@@ -49,7 +49,7 @@ def test_a_collection_searches_by_the_profiles_and_settings_that_it_is_given() -
     assert settings.in_words == "B=3 machine=fractal5pro search.seam_mm=1.5"
 
 
-def test_a_search_that_the_clock_ended_is_told_apart(tmp_path: Path) -> None:
+def test_a_search_ended_by_its_time_limit_is_marked(tmp_path: Path) -> None:
     path = _npz(tmp_path / "ball.npz", shapes.ball())
     assert run(Row("ball", 0, "paper", Settings(1, None, 0.0).in_words), path, Settings(1, None, 0.0))[0].late == 1
 
@@ -98,7 +98,7 @@ def test_an_index_keeps_the_last_line_of_a_search(tmp_path: Path) -> None:
     assert (read.excluded, read.outcome) == ("", 0.25)
 
 
-def test_what_failed_or_lost_its_record_is_done_again(tmp_path: Path) -> None:
+def test_failed_runs_and_lost_records_are_repeated(tmp_path: Path) -> None:
     reasons = {"a": "", "b": "", "c": "no risky face", "d": "failed: by accident"}
     rows = [Row(name, 0, "paper", "B=50", excluded=reason) for name, reason in reasons.items()]
     (tmp_path / "a.0.paper.npz").touch()

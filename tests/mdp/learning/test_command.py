@@ -14,7 +14,7 @@ from profiles.errors import UserError
         (KeyboardInterrupt(), 130, "interrupted; begin anew\n"),
     ],
 )
-def test_what_a_person_can_mend_ends_in_a_sentence(
+def test_a_user_error_ends_in_one_sentence(
     wrong: BaseException, code: int, sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     def command(arguments: Sequence[str] | None) -> None:

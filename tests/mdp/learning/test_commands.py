@@ -91,7 +91,7 @@ def test_figure_7_is_drawn_from_a_table(tmp_path: Path, capsys: pytest.CaptureFi
         (["--fold", "few", "nowhere"], "argument --fold: invalid int value: 'few'; --help shows what is allowed"),
     ],
 )
-def test_what_cannot_be_done_is_told_in_a_sentence(
+def test_an_impossible_command_is_refused_in_one_sentence(
     arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert evaluate.main(arguments) == 1
@@ -99,7 +99,7 @@ def test_what_cannot_be_done_is_told_in_a_sentence(
 
 
 @pytest.mark.train
-def test_a_folder_without_records_and_an_unknown_baseline_are_told(
+def test_a_folder_without_records_and_an_unknown_baseline_are_refused(
     records: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     _needs(*EXTRA)

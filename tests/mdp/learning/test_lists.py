@@ -35,7 +35,7 @@ def test_records_of_other_terms_are_left_out_when_asked(tmp_path: Path) -> None:
         read_lists(tmp_path, terms=("**",))
 
 
-def test_features_are_found_by_name_wherever_they_stand(tmp_path: Path) -> None:
+def test_features_are_found_by_name_in_any_column(tmp_path: Path) -> None:
     names = ("rim", *reversed(PAPER_COLUMNS))
     write_record(tmp_path / "a.0.x.npz", OUTCOME, features=np.tile(np.arange(7.0), (4, 1)), columns=np.array(names))
     write_record(tmp_path / "b.0.x.npz", OUTCOME, features=np.tile(np.arange(6.0), (4, 1)))
@@ -45,7 +45,7 @@ def test_features_are_found_by_name_wherever_they_stand(tmp_path: Path) -> None:
     assert turned.columns == straight.columns == PAPER_COLUMNS
 
 
-def test_a_candidate_whose_node_nobody_expanded_is_censored(tmp_path: Path) -> None:
+def test_a_candidate_whose_node_was_not_expanded_is_censored(tmp_path: Path) -> None:
     child, expanded = np.array([1, -1, 2, 3]), np.array([True, True, False, True])
     write_record(tmp_path / "a.0.x.npz", OUTCOME, child=child, node_expanded=expanded)
     write_record(tmp_path / "b.0.x.npz", OUTCOME)
@@ -69,7 +69,7 @@ def test_models_of_one_repository_and_folder_are_of_one_source(tmp_path: Path) -
     assert [entry.source for entry in read_lists(tmp_path)] == ["a", "a", "b", "c"]
 
 
-def test_sources_are_split_as_in_the_paper_and_always_alike() -> None:
+def test_sources_are_split_as_in_the_paper_deterministically() -> None:
     sides = [side(f"source {number}") for number in range(2000)]
     assert [sides.count(wanted) / 2000 for wanted in Side] == pytest.approx([0.60, 0.15, 0.25], abs=0.02)
     assert [side(name) for name in ("a", "b", "c")] == [Side.TEST, Side.TRAIN, Side.TRAIN]
@@ -81,7 +81,7 @@ def test_every_source_is_tested_in_exactly_one_fold_and_trains_in_at_least_two()
     assert ((sides == Side.TRAIN).sum(axis=1) >= 2).all()
 
 
-def test_what_judges_in_one_split_trains_in_the_next() -> None:
+def test_the_test_set_of_one_split_is_training_data_in_the_next() -> None:
     judges = [f"source {number}" for number in range(500) if side(f"source {number}") is Side.TEST]
     assert {side(source, 1) for source in judges} == {Side.TRAIN}
 
@@ -118,7 +118,7 @@ def test_a_record_that_cannot_be_learnt_from_is_refused(tmp_path: Path, others: 
         read_lists(tmp_path)
 
 
-def test_what_is_no_record_is_refused(tmp_path: Path) -> None:
+def test_an_invalid_record_is_refused(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="holds no record"):
         read_lists(tmp_path)
     (tmp_path / "a.npz").write_bytes(b"PK torn")
@@ -159,7 +159,7 @@ def test_a_short_list_has_no_zero_and_equal_outcomes_keep_their_order() -> None:
     assert listed(0.2, 0.1, 0.2).ratings.tolist() == [4, 5, 3]
 
 
-def test_candidates_that_nobody_followed_leave_the_list_unless_they_are_its_best() -> None:
+def test_candidates_not_followed_leave_the_list_unless_they_are_its_best() -> None:
     (shortened,) = followed([listed(0.4, 0.2, 0.3, 0.2, censored=(1, 2))])
     assert shortened.outcome.tolist() == [0.4, 0.2, 0.2]
     assert shortened.features[:, 0].tolist() == [0, 6, 18]

@@ -27,7 +27,7 @@ SMALL_SET = Path(__file__).parent / "data"
 METADATA = {"kind": "urank", "data_set": "drawn, 3 lists", "commit": "abc", "figures": "NDCG@1 .4"}
 
 
-def test_what_a_cut_saves_is_weighed_against_what_it_loses_for_ever() -> None:
+def test_the_savings_of_a_cut_are_weighed_against_its_permanent_losses() -> None:
     assert contrasts(("M2", "M3", "M6")).tolist() == [[1.0, 1.0, 1.0], [0.0, 0.0, 0.0], [-1.0, -4.0, -16.0]]
 
 
@@ -63,7 +63,7 @@ def test_features_are_scaled_over_the_candidates_that_are_there() -> None:
     assert np.array_equal(scaled(padded.features, padded.present, 1e-8)[1, :4].numpy(), scale(lists[1].features))
 
 
-def test_a_list_is_scored_alike_alone_and_in_a_batch() -> None:
+def test_a_list_has_the_same_scores_alone_and_in_a_batch() -> None:
     network, lists = PaperNetwork(PAPER_COLUMNS), [drawn_list(1, 9), drawn_list(2, 4)]
     padded = OBJECTIVES["urank"].pad(lists, PAPER_COLUMNS)
     with torch.no_grad():
@@ -170,6 +170,6 @@ def test_the_file_says_what_it_is(tmp_path: Path) -> None:
     assert [path.name for path in tmp_path.iterdir()] == ["ranker.onnx"]
 
 
-def test_a_file_that_cannot_be_written_is_told_in_a_sentence(tmp_path: Path) -> None:
+def test_an_unwritable_file_is_reported_in_one_sentence(tmp_path: Path) -> None:
     with pytest.raises(UserError, match="cannot be written"):
         write(tmp_path / "nowhere" / "ranker.onnx", b"")

@@ -45,7 +45,7 @@ def test_a_row_holds_the_mean_the_ratio_to_plain_the_closed_gap_and_the_core_tim
     assert cells(table(comparison), "classic", 10)[3:5] == ["100%", "100% to 100%"]
 
 
-def test_a_learned_ranker_without_a_plain_search_beside_it_is_compared_with_nothing() -> None:
+def test_a_learned_ranker_without_a_plain_search_has_no_comparison() -> None:
     (comparison,) = compare([search("a", "learned", 2, 0.5)])
     assert cells(table(comparison), "learned", 2) == ["0.5000", *"-------"]
 

@@ -23,7 +23,7 @@ def feet(places: list[tuple[int, int]]) -> m3.Manifold:
 
 @settings(max_examples=25)
 @given(PLACES)
-def test_the_disc_of_the_footprint_holds_all_that_stands_on_the_platform_and_is_nearly_the_least(
+def test_the_disc_of_the_footprint_is_nearly_the_smallest_enclosing_circle(
     places: list[tuple[int, int]],
 ) -> None:
     mesh = from_manifold(feet(places))

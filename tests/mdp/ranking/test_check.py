@@ -80,7 +80,7 @@ def test_every_candidate_is_counted_under_one_reason_and_what_gains_too_little_i
 
 
 @pytest.mark.parametrize(("least_mm2", "scored"), [(-np.inf, True), (1e9, False)])
-def test_what_a_cut_must_gain_decides_what_is_scored(least_mm2: float, scored: bool) -> None:
+def test_the_least_gain_of_a_cut_decides_which_candidates_are_scored(least_mm2: float, scored: bool) -> None:
     mesh = tee()
     found = score_candidates(Remainder(mesh, risky_upright(mesh, 45.0)), limits_for(mesh, 10), TERMS, least_mm2)
     assert (len(found.gain_mm2) > 0) == scored

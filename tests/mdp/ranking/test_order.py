@@ -212,7 +212,7 @@ def test_the_threshold_of_the_paper_rises_from_a_ten_thousandth_by_factors_of_fi
     assert relaxation_rounds(np.array([share])).tolist() == [number]
 
 
-def test_of_no_candidates_nothing_is_ranked() -> None:
+def test_no_candidates_give_an_empty_ranking() -> None:
     none = table_of(drawn(0, 1))
     assert list(rank_by_trade_off([none], 1.0, BOUND_MM2)) == list(shortlist([none], BOUND_MM2)) == []
     assert list(rank_classic([none], BOUND_MM2)) == list(rank_by_trade_off([], 1.0, BOUND_MM2)) == []

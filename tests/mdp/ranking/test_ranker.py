@@ -57,7 +57,7 @@ def test_candidates_beyond_the_list_keep_their_order_behind_it() -> None:
     assert {each.row for each in ranked[:50]} == {each.row for each in offered[:50]}
 
 
-def test_a_shortlist_holds_feasible_candidates_once_few_of_a_kind_and_none_that_leaves_too_much() -> None:
+def test_a_shortlist_has_distinct_feasible_candidates_that_leave_little() -> None:
     problem = _problem(shape="ball")
     table = problem.table(problem.root, described=True)
     listed = list(shortlist([table], np.inf))
@@ -115,7 +115,7 @@ def test_a_wide_beam_holds_the_narrow_one_with_a_learned_ranker_too(shape: str) 
 
 
 @pytest.mark.parametrize("width", [1, 2])
-def test_the_published_search_follows_the_plain_best_beside_what_a_learned_ranker_chose(width: int) -> None:
+def test_the_published_search_follows_the_plain_best_and_the_learned_choices(width: int) -> None:
     profile = load(settings=(*SETTINGS, "search.method=published", f"search.beam_width={width}", "search.most_parts=2"))
     problem = Problem(shapes.branch(), profile)
     table = problem.table(problem.root, described=True)
@@ -141,7 +141,7 @@ def test_a_single_slot_is_polished_where_a_learned_ranker_saved_the_time() -> No
         assert len(beam.finalists()) == finalists
 
 
-def test_where_nothing_on_the_shortlist_can_be_cut_the_next_candidates_are_taken(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_next_candidates_are_tried_if_no_shortlisted_one_can_be_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     problem = _problem()
     table = problem.table(problem.root, described=True)
     listed = {table.plane(each.row).offset_mm for each in shortlist([table], np.inf)}
@@ -152,7 +152,7 @@ def test_where_nothing_on_the_shortlist_can_be_cut_the_next_candidates_are_taken
     assert beam.best.cuts[0].base.offset_mm not in listed
 
 
-def test_a_name_that_is_no_ranker_is_told_with_those_that_are() -> None:
+def test_an_unknown_ranker_is_refused_with_the_known_names() -> None:
     with pytest.raises(UserError, match=r"--ranker oracle: classic, learned or the name of an \.onnx file is allowed"):
         ranker_named("oracle")
 

@@ -16,14 +16,14 @@ def _lowest(elevation_deg: float, turn_deg: float) -> Floats:
 
 
 @pytest.mark.parametrize("offset_mm", [0.0, 5.0, -5.0])
-def test_a_plane_and_one_that_looks_the_opposite_way_are_never_alike(offset_mm: float) -> None:
+def test_opposite_planes_are_never_alike(offset_mm: float) -> None:
     normal = np.array([1.0, 0.0, 0.0])
     assert nearly_equal(Plane(normal, offset_mm), Plane(normal, offset_mm + 1.9))
     assert not nearly_equal(Plane(normal, offset_mm), Plane(normal, offset_mm + 2.1))
     assert not any(nearly_equal(Plane(normal, offset_mm), Plane(-normal, other_mm)) for other_mm in (offset_mm, -offset_mm))
 
 
-def test_a_turn_of_18_degrees_tells_planes_apart() -> None:
+def test_planes_18_degrees_apart_are_different() -> None:
     normals = [_lowest(60.0, 0.0), _lowest(77.0, 0.0), _lowest(79.0, 0.0)]
     assert [nearly_equal(Plane(normals[0], 5.0), Plane(other, 5.0)) for other in normals[1:]] == [True, False]
 

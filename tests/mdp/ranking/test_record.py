@@ -97,14 +97,14 @@ def test_the_outcome_of_a_candidate_is_that_of_its_child() -> None:
     assert np.isnan(outcome[1])
 
 
-def test_a_node_that_the_beam_left_behind_is_told_apart() -> None:
+def test_a_node_dropped_by_the_beam_is_marked() -> None:
     record = trace().arrays()
     assert record["node_expanded"].tolist() == [True, True, True, False, False, False]
     assert record["node_stage"].tolist() == [0, 1, 1, 1, 2, 2]
     assert record["node_parent"].tolist() == [-1, 0, 0, 0, 1, 1]
 
 
-def test_what_is_added_twice_in_a_stage_is_one_row() -> None:
+def test_a_node_added_twice_in_a_stage_is_one_row() -> None:
     search = Trace("m", MODEL, "model")
     search.begin_stage(["model"])
     search.add([offer("model", 1), offer("model", 2)], [(0, "a", 50.0)])
@@ -114,7 +114,7 @@ def test_what_is_added_twice_in_a_stage_is_one_row() -> None:
     assert (record["chosen"].tolist(), record["child"].tolist()) == ([True, True, False], [1, 2, -1])
 
 
-def test_a_twin_whose_signature_rounds_otherwise_is_the_same_node() -> None:
+def test_a_duplicate_whose_signature_rounds_differently_is_the_same_node() -> None:
     search = Trace("m", MODEL, "model")
     search.begin_stage(["model"])
     search.add([offer("model", 1)], [(0, "a", 50.0), (0, "a rounded", 50.0)])

@@ -53,7 +53,7 @@ def test_faces_turned_over_and_merged_keep_their_colours() -> None:
     assert [middles[tuple(row)] for row in solid.vertices[solid.faces].mean(axis=1).round(6)] == colours.tolist()
 
 
-def test_what_paints_nothing_has_no_colours() -> None:
+def test_unpainted_faces_have_no_colours() -> None:
     box = files.placed(10, 10, 10)
     plain = Surface(box.vertices, box.faces.astype(np.int64))
     assert carry_colours([plain], repair([plain])[0]) is None
@@ -77,7 +77,7 @@ def test_a_mesh_that_is_scaled_and_turned_keeps_its_colours(tmp_path: Path) -> N
     assert turned.colours.tolist() == mesh.colours.tolist()
 
 
-def test_pieces_of_painted_faces_are_found_as_by_trying_all_of_them() -> None:
+def test_pieces_of_painted_faces_equal_those_of_brute_force() -> None:
     rng = np.random.default_rng(7)
     painted = rng.uniform(-50.0, 50.0, (120, 3, 3)) * rng.choice([0.02, 0.2, 1.0], (120, 1, 1))
     painted += rng.uniform(-50.0, 50.0, (120, 1, 3))

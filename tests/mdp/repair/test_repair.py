@@ -65,7 +65,7 @@ def test_a_shell_inside_out_is_turned_with_its_void() -> None:
     assert notes == ["turned 2 of 2 shells the right side out"]
 
 
-def test_a_void_stays_and_a_body_wound_inwards_beside_it_is_turned() -> None:
+def test_a_void_stays_and_an_inverted_body_beside_it_is_flipped() -> None:
     mesh, notes = mended(both(hollow(), inside_out(placed(5, 5, 5, (30, 0, 0)))))
     assert mesh.volume_mm3 == pytest.approx(20**3 - 10**3 + 5**3)
     assert notes == ["turned 1 of 3 shells the right side out"]
@@ -102,7 +102,7 @@ def test_bodies_that_touch_in_an_edge_are_closed_each() -> None:
     assert mesh.areas_mm2.sum() == pytest.approx(1200)
 
 
-def test_an_edge_of_four_faces_that_hang_together_elsewhere_gets_a_vertex_of_its_own() -> None:
+def test_an_edge_of_four_connected_faces_gets_its_own_vertex() -> None:
     arch = m3.Manifold.cube((30, 10, 10)) + m3.Manifold.cube((10, 10, 20)) + m3.Manifold.cube((10, 10, 20)).translate((20, 0, 0))
     touching = (
         arch + m3.Manifold.cube((10, 10, 10)).translate((10, 0, 20)) + m3.Manifold.cube((10, 10, 30)).translate((10, 10, 0))
@@ -232,7 +232,7 @@ def test_a_speck_is_left_out() -> None:
     assert (mesh.volume_mm3, notes) == (pytest.approx(8000), ["left out 1 shell with next to no volume"])
 
 
-def test_what_would_take_away_from_the_box_is_refused() -> None:
+def test_a_repair_that_would_shrink_the_bounding_box_is_refused() -> None:
     far = placed(0.01, 0.01, 0.01, (5, 5, 40))
     assert "lacks 20 mm of its extent of 40" in refusal(both(placed(20, 20, 20), far))
 
@@ -244,7 +244,7 @@ def test_unused_vertices_are_dropped_and_the_order_of_the_others_stays() -> None
 
 
 @pytest.mark.parametrize(("grid", "change_percent"), [(78, "-0.05"), (22, "+0.696")])
-def test_folds_of_a_coarsely_rounded_model_are_left_out_and_the_difference_is_told(grid: int, change_percent: str) -> None:
+def test_folds_of_a_coarsely_rounded_model_are_removed_and_reported(grid: int, change_percent: str) -> None:
     fine = readers.READERS[".ply"](locate("demo:lattice"), None).objects[0].volumes[0][0]
     step_mm = np.ptp(fine.vertices, axis=0).max() / grid
     surface, notes = repair([Surface(np.round(fine.vertices / step_mm) * step_mm, fine.faces)])

@@ -81,7 +81,7 @@ def test_candidates_that_leave_too_much_for_ever_are_left_out() -> None:
     assert list(rank_by_trade_off([table], 0.0, float(least))) == []
 
 
-def test_the_round_is_the_one_whose_residual_threshold_lets_a_candidate_in() -> None:
+def test_the_round_is_the_first_whose_residual_threshold_admits_a_candidate() -> None:
     problem = _problem(1, "ball")
     table = problem.table(problem.root)
     for candidate in rank_classic([table], np.inf):
@@ -99,7 +99,7 @@ def test_parts_of_the_preferred_volume_come_first_and_all_others_after_them() ->
     assert 0 < sum(large) < len(large)
 
 
-def test_what_gains_too_little_is_for_large_parts_of_the_classic_ranking_only() -> None:
+def test_candidates_with_little_gain_are_only_for_large_parts_of_the_classic_ranking() -> None:
     problem = Problem(shapes.branch(), load(settings=("search.directions=150", "search.least_gain=0.2")))
     table, least_mm2 = problem.table(problem.root, large=True), problem.least_gain_mm2
     small = {row for row in range(len(table.reason)) if table.scored.gain_mm2[row] < least_mm2}

@@ -94,7 +94,7 @@ def test_a_plan_takes_another_row_of_its_front_without_a_search() -> None:
     assert many.notes == (f"{option('parts', 50)}: the plan plan.toml holds no more than {len(searched.front)}",)
 
 
-def test_planes_that_a_person_has_changed_stay_a_row_of_the_plan_when_another_row_is_cut() -> None:
+def test_planes_changed_by_hand_stay_a_row_of_the_plan_when_another_row_is_cut() -> None:
     searched = plan_of(_searched_arms())
     mine = replace(searched, parts=_by_hand((UP, 35.0), (UP, 40.0)).parts)
     for front in (searched.front, tuple(row for row in searched.front if row.parts < 3)):
@@ -105,7 +105,7 @@ def test_planes_that_a_person_has_changed_stay_a_row_of_the_plan_when_another_ro
         )
 
 
-def test_a_search_for_so_many_parts_takes_that_row_of_the_front() -> None:
+def test_a_search_for_a_number_of_parts_chooses_that_row_of_the_front() -> None:
     free, (two, many) = (
         _searched_arms(),
         (decompose(_two_arms(), "shape", _profile(), SearchRequest(parts=parts)) for parts in (2, 50)),
@@ -142,7 +142,7 @@ def test_a_plan_of_another_model_is_refused() -> None:
     )
 
 
-def test_a_plane_beside_the_model_is_refused_with_what_it_could_be() -> None:
+def test_a_plane_beside_the_model_is_refused_with_the_possible_range() -> None:
     sentence = _refusal(shapes.box(), (UP, 35.0))
     assert sentence.startswith("plan mine.toml: part 2 cannot be cut off: its plane misses the model")
     assert "between 0.0 and 20.0 mm, offset_mm is 35" in sentence
@@ -161,7 +161,7 @@ def test_planes_in_an_impossible_order_are_refused() -> None:
     assert len(_cut(shapes.box(z=40.0), (UP, 20.0), (UP, 30.0)).parts) == 3
 
 
-def test_a_plane_that_cuts_the_platform_is_refused() -> None:
+def test_a_plane_that_cuts_the_build_plate_is_refused() -> None:
     sentence = _refusal(shapes.box(), (LEANING, 2.0))
     assert "part 2 cannot be cut off: it would cut into the build plate; offset_mm must be at least " in sentence
     assert "offset_mm must be at least 8.5" in sentence  # 0.6 times 10 sqrt 2
@@ -220,7 +220,7 @@ def test_a_plan_with_a_plane_left_open_is_sent_to_the_search() -> None:
         cut_by_plan(shapes.tee(), "shape", _profile(), SearchRequest(plan=replace(_by_hand((LEANING, None)), name="")))
 
 
-def test_an_open_offset_is_found_where_the_most_becomes_safe() -> None:
+def test_an_open_offset_is_chosen_to_save_the_most_support() -> None:
     by_hand = _by_hand((LEANING, None))
     profile = _profile("search.most_parts=2")
     completed = decompose(shapes.branch(), "shape", profile, SearchRequest(plan=by_hand))
@@ -230,7 +230,7 @@ def test_an_open_offset_is_found_where_the_most_becomes_safe() -> None:
     assert completed.reduction > 0.8
 
 
-def test_an_open_direction_is_found_for_its_offset() -> None:
+def test_an_open_direction_is_chosen_for_its_offset() -> None:
     found = decompose(shapes.branch(), "shape", _profile("search.most_parts=2"), SearchRequest(plan=_by_hand((None, 20.25))))
     assert [plane[1] for plane in _planes(found)] == [20.25]
     assert found.reduction > 0.5
@@ -312,7 +312,7 @@ def test_no_plane_passes_through_faces_of_a_colour_that_stay_whole() -> None:
         cut_by_plan(tee, "shape", _profile(), SearchRequest(plan=_by_hand(((-0.6, 0.0, 0.8), 31.2), zones=zones)))
 
 
-def test_seams_weigh_a_hundred_times_on_faces_of_a_colour_alone_whatever_earlier_cuts_left_of_them() -> None:
+def test_seams_weigh_a_hundredfold_on_faces_of_a_colour_after_any_cuts() -> None:
     around = np.array([(-10, -10), (0, -10), (10, -10), (10, 10), (0, 10), (-10, 10)], dtype=np.float64)
     corners = np.concatenate([np.column_stack([around, np.full(6, z)]) for z in (0.0, 20.0)])
     cap, following = np.array([(0, 1, 5), (1, 4, 5), (1, 2, 4), (2, 3, 4)]), np.roll(np.arange(6), -1)
@@ -338,7 +338,7 @@ def test_a_colour_that_nothing_is_painted_with_is_refused_by_its_name() -> None:
         cut_by_plan(_painted_tee(), "shape", _profile(), SearchRequest(plan=_by_hand((UP, 35.0), zones=zones)))
 
 
-def test_a_zone_without_seams_says_so_where_seams_cost_nothing() -> None:
+def test_a_zone_without_seams_gives_a_note_if_seams_cost_nothing() -> None:
     zones = Zones(no_seam=(Zone((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),))
     found = decompose(shapes.tee(), "shape", _profile("search.seam_mm=0"), SearchRequest(plan=_by_hand(zones=zones)))
     sentence = "[[no_seam]] has no effect on cuts, since seams cost nothing (search.objective, search.seam_mm)"
@@ -390,7 +390,7 @@ def test_every_part_knows_how_long_its_seam_is_seen() -> None:
     assert cut.seam_mm == pytest.approx(124.0)
 
 
-def test_a_part_with_a_feather_edge_is_told() -> None:
+def test_a_part_with_a_feather_edge_is_reported() -> None:
     wedge = mesh_of(
         below(solid_of(shapes.box(20.0, 20.0, 40.0)), Plane(np.array([0.0, np.sin(0.2), np.cos(0.2)]), 30.0 * np.cos(0.2)))
     )

@@ -47,7 +47,7 @@ def fine() -> Mesh:
     return _fine()
 
 
-def test_the_copy_has_fewer_faces_and_lies_within_a_layer(fine: Mesh) -> None:
+def test_the_copy_has_fewer_faces_and_deviates_by_less_than_a_layer(fine: Mesh) -> None:
     copy = coarse_copy(fine, _profile(2000), NO_ZONES)
     assert copy is not None
     assert len(copy.faces) < 0.5 * len(fine.faces)
@@ -88,7 +88,7 @@ def test_a_copy_that_spares_few_faces_is_not_used() -> None:
     assert coarse_copy(_fine(bumps_mm=1.0), _profile(2000), NO_ZONES) is None
 
 
-def test_the_model_itself_is_cut_for_about_the_cost_that_its_own_search_finds() -> None:
+def test_a_search_on_the_copy_costs_about_the_same_as_on_the_model() -> None:
     fine = _fine(0.005, 1.5)  # the slopes of higher bumps count as stair-stepping, which the copy does not have
     copied, itself = (decompose(fine, "shape", _profile(faces)) for faces in (3000, 0))
     assert len(copied.parts) == len(itself.parts) == 2
@@ -101,7 +101,7 @@ def test_the_model_itself_is_cut_for_about_the_cost_that_its_own_search_finds() 
     assert copied.chosen.planes[0].normal.tolist() == copied.parts[1].base.normal.tolist()
 
 
-def test_a_plane_by_hand_stays_where_it_was_laid(fine: Mesh) -> None:
+def test_a_plane_by_hand_is_not_moved(fine: Mesh) -> None:
     by_hand = PlanFile("mine", parts=(PlannedPart((0.6, 0.0, 0.8), 32.0),))
     parts = decompose(fine, "shape", _profile(2000), SearchRequest(plan=by_hand)).parts
     assert ((0.6, 0.0, 0.8), 32.0) in [(tuple(part.base.normal), part.base.offset_mm) for part in parts[1:]]
@@ -113,7 +113,7 @@ def test_a_model_on_a_pedestal_is_cut_above_it(fine: Mesh) -> None:
     assert len(found.parts) == 2
 
 
-def test_the_way_it_lies_is_looked_at_on_the_copy_and_searched_of_the_model_itself() -> None:
+def test_orientations_are_compared_on_the_copy_and_searched_on_the_model() -> None:
     mesh, profile, searched = mesh_of(solid_of(shapes.tee(arm=80.0)).refine(20)), _profile(2000), []
 
     def search(mesh: Mesh) -> Decomposition:
@@ -159,12 +159,12 @@ def test_a_plane_that_leaves_a_sliver_is_moved_to_the_nearest_that_cuts() -> Non
     assert plane.normal @ flush.normal > np.cos(np.radians(3.1))
 
 
-def test_a_plane_that_misses_has_no_other_beside_it() -> None:
+def test_a_plane_that_misses_the_model_has_no_neighbour() -> None:
     problem = Problem(shapes.tee(), _profile(0))
     assert cut_near(problem, problem.root, Plane(np.array([1.0, 0.0, 0.0]), 30.0)) is None
 
 
-def test_a_copy_is_searched_before_the_mesh_itself_is_measured_and_every_phase_is_told(fine: Mesh) -> None:
+def test_a_copy_is_searched_before_the_mesh_is_measured_and_every_phase_is_reported(fine: Mesh) -> None:
     heard: list[str] = []
     decompose(
         fine,

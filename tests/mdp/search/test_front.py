@@ -32,7 +32,7 @@ def test_the_dearer_a_second_the_fewer_the_parts_that_take_long(second_mm2: floa
 
 
 @given(st.lists(st.tuples(st.floats(0, 1e4), st.floats(1, 1e5)), min_size=1, max_size=8))
-def test_where_time_is_free_the_fewest_parts_are_taken_that_are_within_one_percent_of_the_uncut_model_of_the_least_scars(
+def test_without_a_price_of_time_the_fewest_parts_near_the_least_marks_are_chosen(
     values: list[tuple[float, float]],
 ) -> None:
     rows = front(*values)
@@ -46,7 +46,7 @@ def test_a_small_part_that_saves_next_to_nothing_is_not_cut_off() -> None:
 
 
 @given(st.lists(st.tuples(st.floats(0, 1e4), st.floats(1, 1e5)), min_size=1, max_size=8))
-def test_where_only_time_counts_the_fastest_row_that_saves_scars_is_taken(values: list[tuple[float, float]]) -> None:
+def test_if_only_time_counts_the_fastest_row_that_saves_marks_is_chosen(values: list[tuple[float, float]]) -> None:
     rows = front(*values)
     fastest_s = min(row.time_s or 0.0 for row, good in zip(rows, pareto_optimal(rows), strict=True) if good)
     assert (rows[choose(rows, Weights(1e9)).place].time_s or 0.0) - fastest_s <= 1e-3
@@ -70,7 +70,7 @@ def test_the_chosen_row_has_the_lowest_total_of_cost_time_and_the_charge_for_fur
     assert [row.total_mm2 for row in choose(THREE, Weights(0.0)).marked(THREE)] == [None] * 3
 
 
-def test_what_more_cuts_would_save_is_told_with_what_it_takes() -> None:
+def test_the_savings_of_more_cuts_are_reported_with_their_time() -> None:
     choice = choose(THREE, Weights(0.5), least_saving=0.4)
     assert choice.note == (
         "3 parts would save 600 mm² of visible marks (support on 400 instead of 1000 mm²) with 2 more cuts: "
@@ -95,7 +95,7 @@ def test_a_row_that_cannot_be_printed_is_not_taken_while_another_one_can() -> No
     assert choose(front((200.0, None), (100.0, None)), Weights(1.0)).place == 1
 
 
-def test_what_is_given_up_for_time_is_told_with_figures() -> None:
+def test_savings_given_up_for_time_are_reported_with_figures() -> None:
     choice = choose(BUNNY, Weights(1.0))
     assert choice.reason == "for the lowest total"
     assert choice.note == (
@@ -120,7 +120,7 @@ def test_seconds_and_filament_count_where_scars_do_and_support_is_printed(settin
     assert worth == Weights(price, 0.04 * (price > 0.0))
 
 
-def test_of_two_rows_that_take_as_long_the_one_with_less_filament_is_taken_where_filament_is_dear() -> None:
+def test_of_two_equally_fast_rows_the_one_with_less_filament_is_chosen_if_that_has_a_price() -> None:
     rows = [
         replace(row, filament_mm=filament_mm)
         for row, filament_mm in zip(front((100.0, 60.0), (90.0, 60.0)), (4e3, 5e3), strict=True)
@@ -132,7 +132,7 @@ def test_a_row_without_a_time_is_said_to_be_no_choice() -> None:
     assert choose(front((200.0, 900.0), (100.0, None)), Weights(1.0)).reason == "for the lowest cost that prints well"
 
 
-def test_where_time_counts_nothing_as_without_support_there_is_no_charge() -> None:
+def test_without_a_price_of_time_cuts_have_no_charge() -> None:
     assert choose(THREE, Weights(0.0), least_saving=1.0).place == 2
 
 

@@ -38,7 +38,7 @@ def test_a_model_costs_the_same_within_2_percent_as_its_mirror_image(mesh: Mesh,
 
 
 @pytest.mark.parametrize(("mesh", "parts"), MODELS)
-def test_a_model_costs_the_same_within_2_percent_wherever_it_stands_on_the_platform(mesh: Mesh, parts: int) -> None:
+def test_the_cost_of_a_model_depends_on_its_place_on_the_plate_by_less_than_2_percent(mesh: Mesh, parts: int) -> None:
     there = cut(Mesh(mesh.vertices + np.array((7.5, -4.25, 0.0)), mesh.faces), parts)
     assert there.cost_mm2 == pytest.approx(cut(mesh, parts).cost_mm2, rel=ELSEWHERE)
 

@@ -53,7 +53,7 @@ def neck(mesh: Mesh, plane: Plane, reach_mm: float = 12.0) -> Plane | None:
 
 @settings(max_examples=6, deadline=None)
 @given(st.floats(-10.0, 10.0), st.floats(0.0, 20.0), st.floats(0.0, 360.0), st.floats(0.0, 180.0), st.floats(0.0, 360.0))
-def test_the_waist_of_an_hourglass_is_found_from_planes_beside_it_however_it_stands(
+def test_the_waist_of_an_hourglass_is_found_from_nearby_planes_in_any_rotation(
     offset_mm: float, tilt_deg: float, towards_deg: float, height_deg: float, around_deg: float
 ) -> None:
     turned = about(unit([cos(radians(around_deg)), sin(radians(around_deg)), 0.3]), radians(height_deg))
@@ -75,14 +75,14 @@ def test_no_plane_of_a_fine_grid_has_a_shorter_rim_at_a_waist_that_is_no_circle(
     assert rim_mm(mesh, found) <= least * (1.0 + 1e-5)
 
 
-def test_of_two_necks_the_thinner_one_within_reach_is_taken() -> None:
+def test_the_thinner_of_two_necks_within_reach_is_chosen() -> None:
     z = np.linspace(0.0, 60.0, 61)
     two = lathe(6.0 + 2.0 * np.cos(2.0 * pi * z / 30.0) - 0.03 * z, z)  # waists at 15 and, thinner, 45
     assert [round(found.offset_mm) for reach in (12.0, 40.0) if (found := neck(two, Plane(Z, 20.0), reach))] == [15, 45]
 
 
 @pytest.mark.parametrize("mesh", [shapes.ball(), shapes.box(), shapes.octahedron(9.0)], ids=["ball", "rod", "tip"])
-def test_what_only_ends_has_no_neck(mesh: Mesh) -> None:
+def test_a_shape_that_only_tapers_has_no_neck(mesh: Mesh) -> None:
     assert neck(mesh, Plane(Z, 14.0)) is None
 
 

@@ -45,7 +45,7 @@ def found(mesh: Mesh) -> Oriented:
 
 
 @pytest.mark.parametrize(("sides", "others"), [((20, 20, 20), 0), ((20, 20, 40), 1), ((20, 30, 40), 2)])
-def test_orientations_that_a_symmetry_makes_alike_count_once(sides: tuple[int, int, int], others: int) -> None:
+def test_orientations_equal_by_symmetry_count_once(sides: tuple[int, int, int], others: int) -> None:
     assert len(distinct_orientations(box(*sides), PROFILE)) == others
 
 
@@ -58,12 +58,12 @@ def test_a_tee_is_laid_on_its_side_where_nothing_needs_support() -> None:
     assert oriented.total_mm2 == pytest.approx(flat_mm2, rel=0.02)  # its stance counts hardly anything
 
 
-def test_what_lies_best_stays_as_it_stands() -> None:
+def test_the_best_orientation_is_kept() -> None:
     assert found(box(40, 30, 10)).orientation is None
 
 
 @pytest.mark.parametrize("mesh", [tee(), branch(), box(10, 20, 60)], ids=["tee", "branch", "box"])
-def test_laid_down_it_costs_no_more_than_in_one_piece_as_it_stands(mesh: Mesh) -> None:
+def test_a_chosen_orientation_costs_no_more_than_one_piece_as_it_stands(mesh: Mesh) -> None:
     whole = decompose(mesh, "mesh", PROFILE, SearchRequest(price=by_height(PROFILE))).front[0]
     footing_mm2 = forecast_orientations(mesh, PROFILE, by_height)[0].footing_mm2
     assert found(mesh).total_mm2 <= total_mm2(whole, Weights.of(PROFILE)) + footing_mm2
@@ -84,7 +84,7 @@ def leaning_plate() -> Mesh:
     return set_on_plate(box(40, 30, 4), turn)
 
 
-def test_of_two_ways_to_lie_that_need_no_support_the_one_without_stairs_is_taken() -> None:
+def test_of_two_orientations_without_support_the_one_without_stairs_is_chosen() -> None:
     ways = distinct_orientations(leaning_plate(), PROFILE)
     assert ways[0].stairs_mm2 == pytest.approx(0.0, abs=1e-6)
     assert facet_orientations(leaning_plate(), 45.0)[0].stairs_mm2 == pytest.approx(
@@ -103,14 +103,14 @@ def searches(mesh: Mesh, price_by: Callable[[Profile], Pricing]) -> tuple[Orient
     return orient_and_decompose(mesh, PROFILE, price_by, search), len(searched)
 
 
-def test_what_can_be_told_without_a_search_is_not_searched() -> None:
+def test_an_orientation_decided_by_the_forecast_is_not_searched() -> None:
     oriented, count = searches(tee(arm=80.0), by_height)
     assert (oriented.orientation is None, oriented.standing, count) == (False, None, 1)
     oriented, count = searches(box(40, 30, 10), by_height)
     assert (oriented.orientation, count) == (None, 1)
 
 
-def test_what_is_searched_in_vain_is_compared_with_how_it_stands() -> None:
+def test_an_unsuccessful_search_of_an_orientation_is_compared_with_the_given_one() -> None:
     def surprised(profile: Profile) -> Pricing:
         bare = profile.process.support == "none"  # a profile of a forecast
         return lambda parts: by_height(profile)(parts) if bare or np.ptp(parts[0].mesh.vertices[:, 2]) > 39 else None
@@ -119,7 +119,7 @@ def test_what_is_searched_in_vain_is_compared_with_how_it_stands() -> None:
     assert (oriented.orientation, count) == (None, 2)
 
 
-def test_a_way_that_ends_dearer_than_good_cuts_would_leave_it_is_compared_with_how_it_stands() -> None:
+def test_an_orientation_more_expensive_than_forecast_is_compared_with_the_given_one() -> None:
     upright = forecast_orientations(tee(), PROFILE, by_height)[0]
     hoped_mm2 = (upright.forecast_mm2 + upright.optimistic_mm2) / 2.0  # less than the forecast, but not certain
     more_s = (hoped_mm2 - found(tee()).total_mm2) / PROFILE.search.second_mm2
@@ -152,7 +152,7 @@ def test_no_orientation_is_taken_that_the_machine_has_no_room_for() -> None:
     assert orient_and_decompose(tee(), PROFILE, on_a_small_plate, search).orientation is None
 
 
-def test_a_model_that_cannot_be_printed_as_it_stands_once_it_is_searched_is_found() -> None:
+def test_an_unprintable_given_orientation_is_replaced() -> None:
     def too_high(profile: Profile) -> Pricing:
         bare = profile.process.support == "none"  # a profile of a forecast
         return lambda parts: by_height(profile)(parts) if bare or np.ptp(parts[0].mesh.vertices[:, 2]) < 39 else None
@@ -162,13 +162,13 @@ def test_a_model_that_cannot_be_printed_as_it_stands_once_it_is_searched_is_foun
     assert np.isfinite(oriented.total_mm2)
 
 
-def test_the_side_that_a_model_lies_on_has_a_name() -> None:
+def test_the_side_on_the_build_plate_has_a_name() -> None:
     assert side_in_words(facet_orientations(tee(), 45.0)[0]) == "as it stands"
     sides = {side_in_words(orientation) for orientation in distinct_orientations(box(20, 30, 40), PROFILE)}
     assert sides <= {"on its front", "on its back", "on its left side", "on its right side", "upside down"}
 
 
-def test_a_cone_on_its_point_is_set_on_its_base_though_nothing_else_tells_the_two_apart() -> None:
+def test_a_cone_on_its_tip_is_set_on_its_base() -> None:
     cone = mesh_of(m3.Manifold.cylinder(40.0, 0.01, 12.0, 64))
     oriented = found(cone)
     assert oriented.orientation is not None
@@ -186,7 +186,7 @@ def test_orientations_are_15_degrees_apart_from_each_other_and_from_that_of_the_
 
 
 @pytest.mark.parametrize("pedestal_mm", [0.0, 5.0])
-def test_what_the_plate_does_not_hold_costs_half_its_surface(pedestal_mm: float) -> None:
+def test_a_model_that_would_tip_over_costs_half_its_surface(pedestal_mm: float) -> None:
     """A needle that neither its brim nor a pedestal can hold lies on its side."""
     profile = load(settings=["search.directions=20", "search.polish=false", f"search.pedestal_mm={pedestal_mm}"])
     needle = mesh_of(m3.Manifold.cylinder(150.0, 1.0, 1.0, 32))
@@ -234,19 +234,19 @@ def lowest_z(mesh: Mesh) -> float:
     return min((float(orientation.rotation[2, 2]) for orientation in distinct_orientations(mesh, PROFILE)), default=1.0)
 
 
-def test_a_model_that_stands_on_a_face_is_not_turned_onto_a_rounded_end() -> None:
+def test_a_model_on_a_face_is_not_turned_onto_a_rounded_end() -> None:
     assert lowest_z(mesh_of(mushroom())) > -0.5
     thin = mushroom() ^ (m3.Manifold.cylinder(30.0, 4.0, 4.0, 64).translate((0.0, 0.0, -30.0)) + block_above())
     assert lowest_z(mesh_of(thin)) == pytest.approx(-1.0)  # its stem touches with 4 % of the shadow: too little
     assert lowest_z(mesh_of(mushroom().trim_by_plane((0.0, 0.0, -1.0), -17.0))) == pytest.approx(-1.0)  # onto a flat top
 
 
-def test_a_cone_that_stands_on_its_tip_is_turned_over() -> None:
+def test_a_cone_standing_on_its_tip_is_turned_over() -> None:
     upright, *others = forecast_orientations(mesh_of(m3.Manifold.cylinder(40.0, 0.01, 12.0, 64)), PROFILE, by_height)
     assert min(other.forecast_mm2 for other in others) < upright.bare_mm2
 
 
-def test_a_foot_is_found_among_hundreds_of_facets_of_rounded_tips_that_need_less_support() -> None:
+def test_a_base_is_found_among_hundreds_of_facets_that_need_less_support() -> None:
     tip = m3.Manifold.batch_hull([m3.Manifold.sphere(3.0, 32), m3.Manifold.sphere(1.0, 48).translate((0.0, 0.0, 30.0))])
     tips = [tip.rotate(turn) for turn in ((0, 90, 0), (0, 90, 90), (0, 90, 180), (0, 90, 270), (0, 180, 0))]
     foot = m3.Manifold.cylinder(30.0, 3.0, 3.0, 32) + m3.Manifold.cylinder(2.0, 6.0, 6.0, 64).translate((0.0, 0.0, 28.0))
@@ -291,7 +291,7 @@ def test_every_further_part_is_charged_a_share_of_what_one_piece_costs() -> None
     assert oriented.total_mm2 == pytest.approx(800.0 + 0.1 * 500.0 + 100.0 + 0.03 * 1200.0, rel=0.005)  # plus its stance
 
 
-def test_where_the_plate_holds_a_model_in_no_orientation_all_are_forecast() -> None:
+def test_all_orientations_are_forecast_if_none_is_stable() -> None:
     spikes = [
         m3.Manifold.cylinder(30.0, 6.0, 0.1, 16).rotate(turn) for turn in ((0, 180, 0), (0, 60, 0), (0, 60, 120), (0, 60, 240))
     ]
@@ -306,7 +306,7 @@ def axis_heights(mesh: Mesh) -> set[float]:
     return {round(abs(float(orientation.rotation[2, 2])), 3) for orientation in distinct_orientations(mesh, PROFILE)}
 
 
-def test_a_turned_body_stands_or_lies_along_its_axis(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_body_of_revolution_is_upright_or_along_its_axis(monkeypatch: pytest.MonkeyPatch) -> None:
     cup = m3.CrossSection([[(0.0, 0.0), (8.0, 0.0), (20.0, 30.0), (0.0, 30.0)]]).revolve(24)
     drum = m3.Manifold.cylinder(30.0, 20.0, 20.0, 48) - m3.Manifold.cylinder(30.0, 5.0, 9.0, 48)
     assert 0.0 not in axis_heights(mesh_of(drum))  # it is already upright

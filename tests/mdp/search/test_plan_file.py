@@ -162,7 +162,7 @@ REFUSED = [
 
 
 @pytest.mark.parametrize(("text", "sentence"), REFUSED, ids=[sentence for _, sentence in REFUSED])
-def test_what_is_no_plan_is_refused_in_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
+def test_an_invalid_plan_is_refused_in_one_sentence(tmp_path: Path, text: str, sentence: str) -> None:
     path = tmp_path / "mine.toml"
     path.write_text(text)
     with pytest.raises(PlanError) as refused:
@@ -174,7 +174,7 @@ def test_what_is_no_plan_is_refused_in_one_sentence(tmp_path: Path, text: str, s
     assert len(message) < 400
 
 
-def test_the_mesh_of_a_modifier_lies_beside_the_plan_as_its_file_has_it(tmp_path: Path) -> None:
+def test_the_mesh_of_a_modifier_is_beside_the_plan_unchanged(tmp_path: Path) -> None:
     insert = shapes.box(3.0, 4.0, 5.0).transform(np.eye(3), (30.0, 0.0, 7.0))
     (tmp_path / "insert.stl").write_bytes(stl(insert))
     (tmp_path / "mine.toml").write_text("version = 1\n[[modifier]]\nmesh = 'insert.stl'\nprocess = {walls = 4}")
@@ -222,7 +222,7 @@ def test_a_file_that_cannot_be_read_is_refused_by_its_name(tmp_path: Path) -> No
             read_plan(tmp_path / (f"{name}.toml" if name != "." else name))
 
 
-def test_a_normal_of_another_length_is_a_direction_all_the_same(tmp_path: Path) -> None:
+def test_a_normal_of_any_length_is_a_direction(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text(f"{FIRST}[[part]]\nnormal = [0, 3, 4]\noffset_mm = 10")
     (part,) = read_plan(tmp_path / "mine.toml").parts
     assert part == PlannedPart((0.0, 0.6, 0.8), 10.0)
@@ -237,13 +237,13 @@ def test_a_plan_whose_normal_is_a_rounding_too_long_is_cut(tmp_path: Path, z: fl
     assert [part.volume_mm3 for part in decomposition.parts] == pytest.approx([500.0, 1500.0])
 
 
-def test_the_word_for_a_mesh_tells_micrometres_apart_and_not_the_last_digits() -> None:
+def test_the_hash_of_a_mesh_distinguishes_micrometres_and_not_rounding() -> None:
     box = shapes.box()
     assert mesh_sha256(box.transform(np.eye(3), (1e-9, 0, 0))) == mesh_sha256(box)
     assert mesh_sha256(box.transform(np.eye(3), (1e-3, 0, 0))) != mesh_sha256(box)
 
 
-def test_a_row_of_at_most_so_many_parts_is_the_one_with_the_most() -> None:
+def test_the_row_of_at_most_n_parts_has_the_most_parts() -> None:
     parts = tuple(PlannedPart((0.0, 0.0, 1.0), float(k)) for k in range(5))
     planes = [plane for part in reversed(parts) if (plane := part.plane) is not None]
     rows = [FrontRow(tuple(planes[first:last]), 0.0, 0.0, 0.0) for first, last in ((4, 5), (1, 3), (1, 5))]

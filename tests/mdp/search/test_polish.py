@@ -59,7 +59,7 @@ def test_a_cut_that_saves_nothing_is_left_out() -> None:
     assert once.cost_mm2 <= twice.cost_mm2
 
 
-def test_where_there_is_room_further_cuts_are_added() -> None:
+def test_further_cuts_are_added_if_they_pay_off() -> None:
     problem = _problem("search.most_parts=4")
     one_side = _after(problem, _through(30.0, 5.2))
     both = polish(problem, one_side)
@@ -90,7 +90,7 @@ def test_a_time_limit_of_nothing_leaves_all_as_it_is() -> None:
     assert polish(problem, node).cost_mm2 == node.cost_mm2
 
 
-def test_a_plane_a_hairs_breadth_from_the_origin_is_refused_and_one_through_it_is_looked_at() -> None:
+def test_a_plane_almost_through_the_origin_is_refused_and_one_through_it_is_evaluated() -> None:
     problem = _problem()
     beside, through = Plane(ALONG_X, 1e-17), Plane(ALONG_X, 0.0)
     assert not problem.allowed(problem.root, beside)
@@ -104,7 +104,7 @@ def _leaning(x: float, y: float) -> Floats:
     return normal / np.linalg.norm(normal)
 
 
-def test_cuts_that_are_nearly_symmetric_become_so_where_the_model_is() -> None:
+def test_nearly_symmetric_cuts_of_a_symmetric_model_become_symmetric() -> None:
     problem = _problem("search.objective=scar")
     askew = [_through(30.0, 5.5, _leaning(0.96, 0.05)), _through(30.0, -5.7, _leaning(-0.95, 0.02))]
     node = _after(problem, *askew)
@@ -116,7 +116,7 @@ def test_cuts_that_are_nearly_symmetric_become_so_where_the_model_is() -> None:
     assert even.cost_mm2 <= 1.01 * node.cost_mm2
 
 
-def test_a_cut_that_is_a_little_askew_to_the_model_lies_along_its_flats_where_that_costs_no_more() -> None:
+def test_a_slightly_oblique_cut_is_aligned_with_flats_at_no_cost() -> None:
     problem = _problem("search.objective=scar")
     askew = np.array([0.98, 0.04, 0.3])
     node = _after(problem, _through(30.0, 9.0, askew / np.linalg.norm(askew)))

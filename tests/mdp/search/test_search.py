@@ -40,7 +40,7 @@ def _found(name: str, *settings_: str, machine: str = "generic_ac") -> Decomposi
     return _decompose(getattr(shapes, name)(), *settings_, machine=machine)
 
 
-def test_a_leaning_arm_becomes_a_part_of_its_own_without_risk() -> None:
+def test_a_leaning_arm_becomes_a_separate_part_without_overhangs() -> None:
     decomposition = _found("branch")
     assert len(decomposition.parts) == 2
     assert decomposition.parts[1].direction[0] > 0.2
@@ -103,7 +103,7 @@ def _area_in_plane(mesh: Mesh, plane: Plane, looking: float) -> float:
     return float(mesh.areas_mm2[inside & (mesh.normals @ plane.normal * looking > 0.5)].sum())
 
 
-def test_each_cut_costs_its_price_beside_its_seam_and_one_that_saves_less_is_not_made() -> None:
+def test_a_cut_that_saves_less_than_its_price_and_seam_is_not_made() -> None:
     free, priced, dear = (_found("branch", f"search.cut_mm2={price}") for price in (0, 7, 1000))
     assert [len(found.parts) for found in (free, priced, dear)] == [2, 2, 1]
     assert priced.front[1].cost_mm2 == pytest.approx(free.front[1].cost_mm2 + 7.0, abs=1e-6)
@@ -116,14 +116,14 @@ def test_a_box_is_one_part_and_says_why() -> None:
     assert decomposition.notes == ("no face needs support: the model is printed as one part",)
 
 
-def test_one_part_that_is_asked_for_needs_no_search() -> None:
+def test_a_request_for_one_part_needs_no_search() -> None:
     whole = decompose(shapes.branch(), "shape", load(), SearchRequest(parts=1))
     assert (len(whole.parts), whole.rounds, whole.candidates_evaluated) == (1, 0, 0)
     assert whole.chosen is not None
     assert whole.residual_area_mm2 == whole.risky_area_mm2 > 0
 
 
-def test_one_part_that_is_asked_for_costs_what_the_search_counts_for_the_uncut_model() -> None:
+def test_a_request_for_one_part_costs_the_same_as_the_uncut_model() -> None:
     whole, searched = decompose(shapes.branch(), "shape", load(), SearchRequest(parts=1)).front[0], _found("branch").front[0]
     assert (whole.support_area_mm2, whole.cost_mm2) == (searched.support_area_mm2, searched.cost_mm2)
     assert whole.support_area_mm2 > 0.0
@@ -135,7 +135,7 @@ def test_no_feasible_cut_names_the_constraints_with_their_counts() -> None:
     assert any("search.least_volume_share" in why for why in decomposition.rejected)
 
 
-def test_every_part_clears_the_table_by_the_heads_own_measure() -> None:
+def test_every_part_clears_the_table_by_the_dimensions_of_the_head() -> None:
     machine = load().machine
     for part in _decompose(shapes.tee(height=60.0)).parts[1:]:
         assert part.mesh.bounds_mm[0, 2] >= least_tip_height_mm(machine, part.pose)
@@ -193,13 +193,13 @@ def test_the_published_search_keeps_to_its_volume_floor() -> None:
     assert all(part.volume_mm3 >= 0.1 * mesh.volume_mm3 for part in decomposition.parts[1:])
 
 
-def test_a_time_limit_of_nothing_leaves_one_part_and_says_so() -> None:
+def test_a_time_limit_of_zero_leaves_one_part_and_says_so() -> None:
     decomposition = _decompose(shapes.tee(), "search.time_limit_s=0")
     assert len(decomposition.parts) == 1
     assert decomposition.notes == (f"{key_name('search.time_limit_s')} = 0 ended the search; the best so far is used",)
 
 
-def test_ctrl_c_ends_the_search_and_what_it_had_begun(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_ctrl_c_ends_the_search_and_its_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[Future[object]] = []
 
     def note(*work: Any) -> Future[object]:
@@ -283,7 +283,7 @@ def test_a_list_of_the_published_search_is_what_filled_its_beam() -> None:
 
 
 @pytest.mark.parametrize("method", ["published", "best"])
-def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_either_of_two_equally_expensive_decompositions_may_be_the_best(method: str, monkeypatch: pytest.MonkeyPatch) -> None:
     words = (f"search.method={method}", "search.objective=risky", "search.directions=100", "search.polish=false")
     usual, offer = decompose(shapes.tee(), "tee", load(settings=words)), ParetoFront.offer
     monkeypatch.setattr(ParetoFront, "offer", lambda front, node: offer(front, replace(node)))
@@ -292,7 +292,7 @@ def test_of_two_decompositions_that_cost_the_same_either_may_be_the_best(method:
     assert len(twin.parts) == len(usual.parts) > 1
 
 
-def test_a_search_tells_that_it_begins_before_its_first_stage_and_where_nothing_needs_support_tells_nothing() -> None:
+def test_a_search_reports_its_beginning_unless_nothing_needs_support() -> None:
     told: list[int] = []
     decompose(
         shapes.tee(),
@@ -321,5 +321,5 @@ def test_a_cut_through_the_bulk_of_a_model_is_made_only_on_demand() -> None:
     assert len(asked.parts) == 2
 
 
-def test_where_nothing_needs_support_no_candidate_is_evaluated() -> None:
+def test_no_candidate_is_evaluated_if_nothing_needs_support() -> None:
     assert decompose(shapes.box(10.0, 10.0, 10.0), "box", load()).candidates_evaluated == 0

@@ -45,7 +45,7 @@ def _searched() -> Decomposition:
     return decompose(shapes.bar_beside_a_tower(), "bar", _profile())
 
 
-def test_a_bar_beside_a_tower_is_cut_off_alone_where_no_half_space_is_worth_it() -> None:
+def test_a_bar_beside_a_tower_is_cut_off_alone_if_no_half_space_is_worth_it() -> None:
     whole, limbs = decompose(shapes.bar_beside_a_tower(), "bar", _profile(single_limb=False)), _searched()
     assert len(whole.parts) == 1
     assert [part.base.limbs_mm is None for part in limbs.parts] == [True, False]
@@ -114,7 +114,7 @@ def test_a_limb_too_near_to_a_tower_is_refused_and_the_place_of_the_tower_is_sho
     assert np.array(trial.obstacle.places_mm)[:, 1].min() > 7.9
 
 
-def test_a_limb_may_be_cut_off_in_the_plane_of_the_plate_that_the_others_stand_on() -> None:
+def test_a_limb_may_be_cut_off_in_the_plane_of_the_slab_under_the_others() -> None:
     mesh = shapes.bar_beside_a_tower(gap=27.0)
     at_the_plate = PlannedPart((0.0, 0.0, 1.0), 4.0, limbs_mm=((0.0, 33.0, 75.0),))
     anything = _profile(fragile_mm=0.0, clearance=False)
@@ -133,7 +133,7 @@ def test_a_limb_that_begins_too_near_to_the_table_is_refused_with_the_head_that_
     assert trial.obstacle.touch is not None
 
 
-def test_a_limb_out_of_reach_of_the_axes_is_refused_for_that_and_not_for_what_stands() -> None:
+def test_a_limb_out_of_reach_is_refused_for_that_and_not_for_its_neighbours() -> None:
     profile, limits = _profile(), {"limits_mm": (-20.0, 20.0)}
     axes = {axis: getattr(profile.machine, axis).model_copy(update=limits) for axis in ("x", "y")}
     narrow = profile.model_copy(update={"machine": profile.machine.model_copy(update=axes)})
@@ -159,7 +159,7 @@ def test_a_limb_with_many_voids_is_one_limb() -> None:
     assert parts[1].volume_mm3 == pytest.approx(12 * 12 * 65 - 7 * 8)
 
 
-def test_a_limb_whose_end_is_a_part_of_its_own_is_told_with_its_own_figures() -> None:
+def test_a_limb_with_a_separate_end_has_its_own_figures() -> None:
     trials = Trials(shapes.bar_beside_a_tower(), _profile(nozzle_load_n=0.0, fragile_mm=0.0))
     rest, end = replace(BAR, limbs_mm=((14.0, 0.0, 50.0),)).plane, replace(BAR, offset_mm=48.0, limbs_mm=()).plane
     assert rest is not None
@@ -183,7 +183,7 @@ def test_a_plan_with_limbs_but_without_a_plane_is_refused(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     "limbs", ["3", "[]", "[[1, 2]]", "[[0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1], [0, 0, 1]]"]
 )
-def test_points_that_are_none_are_refused_with_what_is_expected(tmp_path: Path, limbs: str) -> None:
+def test_invalid_points_are_refused_with_the_expected_form(tmp_path: Path, limbs: str) -> None:
     text = f"version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 4\nlimbs_mm = {limbs}\n"
     (tmp_path / "plan.toml").write_text(text)
     with pytest.raises(PlanError, match="part 2: limbs_mm"):

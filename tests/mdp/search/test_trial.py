@@ -44,7 +44,7 @@ def test_figures_on_a_pedestal_are_those_of_the_cuts_too() -> None:
     assert tried.support_area_mm2 == pytest.approx(cut.chosen.support_area_mm2) == pytest.approx(300.0)
 
 
-def test_cuts_that_meet_each_other_have_their_own_figures_too() -> None:
+def test_intersecting_cuts_have_their_own_figures() -> None:
     leaning = [((1.0, 0.0, 0.5), 12.0), ((-1.0, 0.0, 0.8), 16.0), ((0.0, 0.3, 1.0), 24.0)]
     planes = [Plane(np.array(normal) / np.linalg.norm(normal), offset_mm) for normal, offset_mm in leaning]
     tried = trials(tee()).attempt(planes)
@@ -63,7 +63,7 @@ def test_figures_come_at_once_and_what_a_later_cut_may_forbid_when_there_is_time
     assert at_once.parts == moved.attempt((floating, ARMS[1])).parts
 
 
-def test_what_was_tried_before_changes_nothing() -> None:
+def test_earlier_trials_change_nothing() -> None:
     moving, moved = trials(tee()), [(Plane(ARMS[0].normal, 8.0 + 0.25 * k), ARMS[1]) for k in (3, 1, 4, 1, 5)]
     assert [moving.attempt(planes) for planes in moved] == [trials(tee()).attempt(planes) for planes in moved]
     assert moving.attempt(ARMS[::-1]) == trials(tee()).attempt(ARMS[::-1])
@@ -99,7 +99,7 @@ def test_the_edge_of_a_cut_is_as_sharp_as_it_leans_against_the_wall(lean_deg: fl
     assert part.edge_deg == pytest.approx(edge_deg)
 
 
-def test_where_the_head_would_meet_the_table_it_is_shown_at_the_lowest_place_of_the_part() -> None:
+def test_a_collision_of_head_and_table_is_shown_at_the_lowest_point_of_the_part() -> None:
     leaning, machine = Plane(np.array([0.8, 0.0, 0.6]), 12.0), PROFILE.machine
     tried = trials(box()).attempt((leaning,))
     assert tried.obstacle is not None
@@ -113,7 +113,7 @@ def test_where_the_head_would_meet_the_table_it_is_shown_at_the_lowest_place_of_
     assert touch.touched_mm[2] == 0.0
 
 
-def test_what_would_float_is_marked_at_its_lowest_place() -> None:
+def test_a_floating_piece_is_marked_at_its_lowest_point() -> None:
     tried = trials(tee()).attempt((Plane(np.array([0.8, 0.0, 0.6]), 12.0),))
     assert "would not stand on the build plate" in tried.rejected
     assert tried.obstacle is not None
@@ -150,14 +150,14 @@ def test_a_plane_is_shifted_to_the_nearest_place_where_it_can_be_cut(wanted_mm: 
 
 
 @pytest.mark.parametrize("wanted_mm", [23.0, 20.0, 18.0])
-def test_a_plane_dragged_past_its_neighbour_goes_to_a_place_just_behind_it(wanted_mm: float) -> None:
+def test_a_plane_dragged_past_its_neighbour_is_placed_just_behind_it(wanted_mm: float) -> None:
     up = np.array([0.0, 0.0, 1.0])
     nearest = trials(box(10.0, 10.0, 100.0)).nearest((Plane(up, 24.0), Plane(up, wanted_mm)), 3)
     assert nearest is not None
     assert (nearest.normal.tolist(), 24.0 < nearest.offset_mm < 24.6) == ([0.0, 0.0, 1.0], True)
 
 
-def test_where_no_level_plane_can_be_cut_the_nearest_one_leans() -> None:
+def test_the_nearest_plane_is_tilted_if_no_level_one_can_be_cut() -> None:
     outline = [(0, 0), (40, 0), *((40 - 0.5 * k, 0.25 * (k + step)) for k in range(40) for step in (0, 1)), (0, 10)]
     stairs = standing(m3.Manifold.extrude(m3.CrossSection([outline]), 20).rotate((90, 0, 0)))
     tried = Trials(stairs, PROFILE)  # no step is as high as search.fragile_mm
@@ -168,19 +168,19 @@ def test_where_no_level_plane_can_be_cut_the_nearest_one_leans() -> None:
     assert tried.attempt([nearest]).rejected == ""
 
 
-def test_where_other_planes_are_refused_no_place_helps() -> None:
+def test_no_position_helps_if_other_planes_are_refused() -> None:
     outside = Plane(np.array([1.0, 0.0, 0.0]), 25.0)
     assert trials(tee()).nearest((Plane(np.array([0.0, 0.0, 1.0]), 30.0), outside), 2) is None
 
 
-def test_a_plane_set_aside_above_which_the_whole_model_lies_leaves_it_for_the_planes_before_it() -> None:
+def test_a_disregarded_plane_below_the_model_leaves_it_to_the_other_planes() -> None:
     below = Plane(UP, -5.0)
     tried = trials(tee())
     tried.set_aside([below])
     assert tried.attempt((Plane(UP, 20.0), below)).rejected == ""
 
 
-def test_a_plane_set_aside_is_cut_all_the_same_so_that_the_planes_after_it_are_tried_on_what_it_leaves() -> None:
+def test_a_disregarded_plane_is_still_cut_for_the_planes_after_it() -> None:
     plane, higher = Plane(UP, 20.0), Plane(UP, 27.0)
     kept = Trials(tee(), PROFILE, Zones(keep=(Zone((-2.0, -2.0, 26.0), (2.0, 2.0, 28.0)),)))
     assert (

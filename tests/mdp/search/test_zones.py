@@ -22,7 +22,7 @@ def _search(mesh: Mesh, **zones: tuple[AnyZone, ...]) -> Decomposition:
 
 
 @pytest.mark.parametrize("zone", [UNDER_AN_ARM, ARM_BOX])
-def test_what_may_not_be_supported_is_cut_so_that_it_needs_none(zone: AnyZone) -> None:
+def test_a_zone_without_support_is_cut_so_that_it_needs_none(zone: AnyZone) -> None:
     tee = shapes.tee()
     assert len(_search(tee).parts) == 1
     parts = _search(tee, no_support=(zone,)).parts
@@ -30,7 +30,7 @@ def test_what_may_not_be_supported_is_cut_so_that_it_needs_none(zone: AnyZone) -
     assert (len(parts) > 1, sum(hanging)) == (True, 0.0)
 
 
-def test_area_that_may_not_be_supported_counts_a_hundred_times_in_the_cost_and_once_in_what_is_told() -> None:
+def test_area_in_a_zone_without_support_costs_a_hundredfold_and_is_reported_once() -> None:
     tee = shapes.tee()
     marked = cut_by_plan(
         tee, "shape", DEAR_SEAMS, SearchRequest(plan=PlanFile("mine.toml", zones=Zones(no_support=(UNDER_AN_ARM,))))
@@ -41,7 +41,7 @@ def test_area_that_may_not_be_supported_counts_a_hundred_times_in_the_cost_and_o
     assert marked.residual_area_mm2 == free.residual_area_mm2 == pytest.approx(300.0)
 
 
-def test_a_bridge_that_a_person_wants_supported_counts_as_in_need_of_support() -> None:
+def test_a_bridge_marked_for_support_counts_as_needing_it() -> None:
     posts = Manifold.cube((6, 10, 15)) + Manifold.cube((6, 10, 15)).translate((10, 0, 0))
     gate = shapes.standing(posts + Manifold.cube((16, 10, 5)).translate((0, 0, 15)))
     under = Zone((-1.9, -9.0, 14.0), (1.9, 9.0, 16.0))

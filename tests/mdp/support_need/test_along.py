@@ -23,7 +23,7 @@ PROCESS = load().process
 UP_DEG = PROCESS.self_supporting_angle_deg
 
 
-def test_directions_asked_singly_or_all_at_once_in_any_order_need_the_same() -> None:
+def test_the_support_of_directions_does_not_depend_on_batch_or_order() -> None:
     mesh, directions = random_solid(5), spread(40)
     table = SupportNeed.of(mesh, PROCESS, 5.0).along(directions)
     asked = SupportNeed.of(mesh, PROCESS, 5.0)
@@ -58,7 +58,7 @@ def test_support_leans_from_the_side_of_a_post_to_a_short_ledge_but_not_to_the_e
     assert set(SupportNeed.of(mesh, PROCESS, 5.0).along(UP[None])[0][under]) == {over_air}
 
 
-def test_upright_a_face_that_a_cut_laid_open_needs_support_where_a_bridge_beside_it_does_not() -> None:
+def test_a_face_exposed_by_a_cut_needs_support_where_a_bridge_beside_it_does_not() -> None:
     mesh = standing(m3.Manifold.cube((20.0, 8.0, 12.0)) - m3.Manifold.cube((10.0, 9.0, 10.0)).translate((5.0, -0.5, 0.0)))
     need = SupportNeed.of(mesh, PROCESS, 5.0)
     self_carrying = np.flatnonzero(~need.upright)

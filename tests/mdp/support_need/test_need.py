@@ -75,7 +75,7 @@ def test_a_ledge_needs_support_unless_it_is_narrower_than_two_lines(depth: float
     assert needing_mm2(ledge(depth)) == pytest.approx(area)
 
 
-def test_what_begins_in_mid_air_needs_support_however_narrow() -> None:
+def test_a_section_that_begins_in_mid_air_needs_support_at_any_width() -> None:
     spike = m3.Manifold.cylinder(8, 0.7, 0.7, 24).translate((0, 0, -8))
     assert needing_mm2(hanging(spike)) == pytest.approx(np.pi * 0.49, rel=0.02)
 
@@ -88,13 +88,13 @@ def test_a_ridge_that_hangs_in_the_air_is_no_bank() -> None:
 
 @settings(max_examples=15)
 @given(st.floats(0.1, 3.0), TURN)
-def test_a_ridge_is_an_anchor_where_it_goes_down_a_millimetre(depth: float, turn: float) -> None:
+def test_a_ridge_is_an_anchor_where_it_extends_down_a_millimetre(depth: float, turn: float) -> None:
     assume(abs(depth - ANCHOR_MM) > 0.01)
     ridge = hanging(block(1, 4, depth + 0.1, (0, 0, -depth)))
     assert needing_mm2(ridge.rotate((0, 0, turn))) == pytest.approx(5.6 * 4 if depth < 1.0 else 1.0 * 4)
 
 
-def test_a_deck_as_low_as_a_few_layers_is_anchored_where_its_pillars_stand_on_the_platform() -> None:
+def test_a_very_low_deck_is_anchored_where_its_pillars_are_on_the_build_plate() -> None:
     low = m3.Manifold.cube((20, 8, 3), True).translate((0, 0, 1.5)) - m3.Manifold.cube((10, 9, 0.8), True).translate((0, 0, 0.4))
     assert needing_mm2(low) == 0.0
 
@@ -105,9 +105,7 @@ def test_two_undersides_that_only_rest_on_each_other_both_need_support() -> None
 
 
 @pytest.mark.parametrize(("side", "lean_deg", "area"), [(0.9, 0.0, 0.0), (1.1, 0.0, 1.21), (0.9, 40.0, 0.0), (1.1, 40.0, 1.58)])
-def test_what_is_smaller_than_the_least_area_as_the_nozzle_sees_it_carries_itself(
-    side: float, lean_deg: float, area: float
-) -> None:
+def test_an_overhang_smaller_than_the_least_area_is_self_supporting(side: float, lean_deg: float, area: float) -> None:
     """A peg under a ceiling whose end is cut off at an angle."""
     assert PROCESS.support_least_mm2 == 1.0
     peg = block(side, side, 10, (0, 0, -8)) - block(9, 9, 9, (0, 0, -9)).rotate((lean_deg, 0, 0)).translate((0, 0, -4))
@@ -138,7 +136,7 @@ def test_a_mushrooms_cap_has_its_stem_beneath_it_on_one_side_and_air_on_the_othe
     assert set(classes[near & (middles[:, 0] < -8)]) == {UNSUPPORTABLE}
 
 
-def test_upright_the_platform_lies_beneath_everything() -> None:
+def test_upright_the_build_plate_is_below_everything() -> None:
     mesh = mushroom()
     assert SupportNeed.of(mesh, PROCESS, 5.0).upright.all()
 

@@ -34,7 +34,7 @@ def block(x: float, y: float, z: float, low: float = 0.0) -> m3.Manifold:
 
 @settings(max_examples=30)
 @given(st.floats(2.0, 45.0), st.floats(6.0, 15.0), TURN)
-def test_a_deck_carries_itself_where_it_is_shorter_than_the_material_bridges_however_it_stands(
+def test_a_deck_shorter_than_the_bridge_length_is_self_supporting_in_any_rotation(
     length: float, width: float, turn: float
 ) -> None:
     assume(abs(length - PROCESS.bridge_mm) > 0.1)
@@ -56,9 +56,7 @@ def test_a_collar_carries_itself_where_it_is_narrower_than_two_lines(width: floa
 
 @settings(max_examples=20)
 @given(st.floats(0.06, 3.0), st.floats(1.0, 8.0), TURN)
-def test_what_hangs_lowest_from_a_ceiling_begins_in_mid_air_however_little_it_hangs(
-    depth: float, side: float, turn: float
-) -> None:
+def test_the_lowest_point_under_a_ceiling_begins_in_mid_air(depth: float, side: float, turn: float) -> None:
     frame = block(20, 20, 12) - block(14, 30, 10) - block(30, 14, 10)
     mesh = standing((frame + block(side, side, depth, 10 - depth)).rotate((0, 0, turn)))
     lowest = np.abs(mesh.vertices[mesh.faces, 2] - (10 - depth)).max(axis=1) < 1e-6
@@ -119,7 +117,7 @@ def test_a_solid_turned_with_its_direction_needs_the_same(seed: int, z: float, t
     assert np.array_equal(needing(mesh, direction), needing(mesh.transform(turned), turned @ direction))
 
 
-def test_what_needs_support_does_not_depend_on_what_else_stands_on_the_platform() -> None:
+def test_needed_support_does_not_depend_on_other_bodies_on_the_build_plate() -> None:
     ledge = block(10, 20, 20) + block(20, 20, 3, 12)
     far = ledge + block(8, 8, 8).translate((60, 0, 0))
     alone, beside = from_manifold(ledge), from_manifold(far)

@@ -87,7 +87,7 @@ def test_a_line_may_end_loose_over_a_fiftieth_of_a_place_and_no_more() -> None:
         assert is_spanned(hanging, 9.0, (1, 4)) == spanned
 
 
-def test_nothing_spans_where_no_line_may_be_long_or_no_side_is_there() -> None:
+def test_nothing_is_a_bridge_without_length_or_sides() -> None:
     assert not is_spanned(box(0, 0, 10, 6), 0.0)
     assert not spans(Sides(np.zeros((0, 4)), np.zeros(0, np.int32)), 1.0, 5.0, WIDTH_MM)
 
@@ -99,7 +99,7 @@ def near_anchors(sides: Sides, reach_mm: float, triangle: Floats, nearest: int) 
 
 @settings(max_examples=150)
 @given(st.integers(0, 100_000), st.integers(0, 9), st.floats(0.2, 3.0))
-def test_a_triangle_is_near_anchors_where_none_of_it_lies_out_of_their_reach(seed: int, count: int, size: float) -> None:
+def test_a_triangle_is_near_anchors_if_all_of_it_is_within_their_reach(seed: int, count: int, size: float) -> None:
     rng = np.random.default_rng(seed)
     ends, anchored = rng.uniform(-1.5, 1.5, (count, 4)), rng.integers(0, 2, count).astype(np.int32)
     triangle = rng.uniform(-size / 2, size / 2, (3, 2))
@@ -113,7 +113,7 @@ def test_a_triangle_is_near_anchors_where_none_of_it_lies_out_of_their_reach(see
         assert LineString(ends[side].reshape(2, 2)).distance(Polygon(triangle)) <= REACH_MM + 1e-6
 
 
-def test_a_wide_triangle_whose_corners_alone_lie_at_anchors_is_not_near_them() -> None:
+def test_a_wide_triangle_with_only_its_corners_at_anchors_is_not_near_them() -> None:
     corners = np.array([(0.0, 0.0), (8.0, 0.0), (0.0, 8.0)])
     dots = Sides(np.hstack([corners, corners + 0.01]), np.ones(3, np.int32))
     assert near_anchors(dots, REACH_MM, corners.ravel(), 0) == -1

@@ -38,7 +38,7 @@ def test_a_pipe_has_the_section_modulus_of_a_pipe() -> None:
     assert _stress(pipe) == pytest.approx(45.0 / (np.pi / 4.0 * (6.0**4 - 4.0**4) / 6.0), rel=1e-3)
 
 
-def test_of_two_pieces_the_weaker_counts_and_turning_changes_nothing() -> None:
+def test_the_weaker_of_two_pieces_counts_in_any_rotation() -> None:
     two = _beam(4.0, 6.0, 31.0) + m3.Manifold.cube((2.0, 2.0, 20.0), True).translate((10.0, 5.0, 6.0))
     thin = 10.0 * np.hypot(6.0 / 8.0, 6.0 / 8.0)
     assert _stress(two, Plane(LEVEL.normal, 6.0)) == pytest.approx(thin)
@@ -53,7 +53,7 @@ def test_an_arch_is_one_piece_on_two_feet() -> None:
     assert _stress(arch) < _stress(legs[0]) * 24.0 / 19.0 / 1.5
 
 
-def test_a_fragment_may_stand_on_anything() -> None:
+def test_a_fragment_may_have_any_base() -> None:
     assert _stress(m3.Manifold.cube((1.0, 1.0, 6.9))) == 0.0
 
 

@@ -23,6 +23,6 @@ def test_a_triangle_in_the_plane_itself_has_nothing_above_it() -> None:
     assert areas_above(np.array([[0, 1, 2]], np.int32), np.zeros(3), np.array([2.0])).tolist() == [0.0]
 
 
-def test_a_triangle_that_stands_on_the_plane_is_wholly_above_it() -> None:
+def test_a_triangle_touching_the_plane_from_above_is_entirely_above_it() -> None:
     heights = np.array([0.0, 0.0, 3.0])
     assert areas_above(np.array([[0, 1, 2]], np.int32), heights, np.array([2.0])).tolist() == [2.0]

@@ -83,7 +83,7 @@ def found(mesh: Mesh) -> list[tuple[bool, float]]:
 
 
 @pytest.mark.parametrize("name", FORMS)
-def test_the_bores_and_pins_of_a_form_are_found_and_nothing_else(name: str) -> None:
+def test_exactly_the_bores_and_pins_of_a_shape_are_found(name: str) -> None:
     solid, features = FORMS[name]
     assert found(mesh_of(solid)) == sorted(features)
 
@@ -99,7 +99,7 @@ def test_turned_and_rounded_as_in_a_file_a_form_has_the_same(
     assert found(rounded_mesh) == sorted(features)
 
 
-def test_a_bore_lies_where_it_was_drilled() -> None:
+def test_a_bore_is_found_where_it_was_drilled() -> None:
     (bore,) = find_cylinders(mesh_of(block() - rod(8).translate((5, -3, 0))))
     assert abs(bore.axis[2]) == pytest.approx(1.0)
     assert bore.middle == pytest.approx([5.0, -3.0, 0.0], abs=1e-6)
@@ -111,9 +111,7 @@ UPRIGHT = Cylinder(np.array([0.0, 0.0, 1.0]), np.array([1.0, 2.0, 3.0]), 4.0, 5.
 
 @settings(max_examples=60, deadline=None)
 @given(st.tuples(*[st.floats(-1.0, 1.0)] * 3), st.floats(-12.0, 12.0))
-def test_a_plane_cuts_a_cylinder_where_points_of_it_lie_on_both_sides(
-    place: tuple[float, float, float], offset_mm: float
-) -> None:
+def test_a_plane_cuts_a_cylinder_with_points_on_both_sides(place: tuple[float, float, float], offset_mm: float) -> None:
     direction = unit(np.add(place, (0.0, 0.0, 1.5)))
     turns = np.linspace(0.0, 2.0 * np.pi, 721)
     rim = np.stack([4.0 * np.cos(turns), 4.0 * np.sin(turns), np.zeros(721)], axis=1)
@@ -124,7 +122,7 @@ def test_a_plane_cuts_a_cylinder_where_points_of_it_lie_on_both_sides(
         assert crossed == pytest.approx(sine if heights.min() < 0.0 < heights.max() else 0.0)
 
 
-def test_a_cut_askew_through_a_bore_costs_what_the_settings_say_and_is_told() -> None:
+def test_an_oblique_cut_through_a_bore_has_the_set_cost_and_is_reported() -> None:
     post = mesh_of(Solid.cube((24, 24, 60), True).translate((0, 0, 30)) - rod(9).rotate((90, 0, 0)).translate((0, 0, 40)))
     askew, level = PlannedPart((0.0, 0.6, 0.8), 32.0), PlannedPart((0.6, 0.0, 0.8), 32.0)
     across = unit((0.6, 0.0, 0.8)) @ np.array([0.0, 1.0, 0.0])

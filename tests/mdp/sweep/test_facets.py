@@ -36,7 +36,7 @@ def test_a_vertex_leaning_more_than_its_flatness_is_regular() -> None:
         assert (turns[regular] == 2).all()
 
 
-def test_neighbours_lie_in_a_ring_each_joined_to_the_next_by_a_face() -> None:
+def test_neighbours_form_a_ring_joined_by_faces() -> None:
     layout = _layout(shapes.branch())
     starts, neighbours = layout.starts, layout.neighbours
     corners = {frozenset(face) for face in layout.triangles.faces.tolist()}

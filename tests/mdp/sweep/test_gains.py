@@ -52,7 +52,7 @@ def matching(mesh: Mesh, other: Mesh) -> np.ndarray:
 
 @settings(max_examples=8)
 @given(st.integers(0, 50), SPHERE)
-def test_what_no_cut_can_save_is_counted_where_it_needs_support_upright_and_along(seed: int, place: tuple[int, int]) -> None:
+def test_unavoidable_support_is_counted_upright_and_along_directions(seed: int, place: tuple[int, int]) -> None:
     mesh, direction = random_solid(seed), random_direction(*place)
     pieces, upright = pieces_of(mesh, seed), risky_upright(mesh, 45.0)
     remainder = Remainder(mesh, upright, pieces=pieces)
@@ -69,7 +69,7 @@ def test_what_no_cut_can_save_is_counted_where_it_needs_support_upright_and_alon
 
 @settings(max_examples=10)
 @given(st.integers(0, 50), SPHERE)
-def test_what_lies_above_a_plane_and_what_lies_below_it_are_the_whole(seed: int, place: tuple[int, int]) -> None:
+def test_the_values_above_and_below_a_plane_add_up(seed: int, place: tuple[int, int]) -> None:
     mesh, direction = random_solid(seed), random_direction(*place)
     remainder = Remainder(mesh, risky_upright(mesh, 45.0))
     up, down = (sweep(remainder, d[None], STEP_MM) for d in (direction, -direction))

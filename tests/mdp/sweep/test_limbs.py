@@ -49,7 +49,7 @@ def _found(mesh: Mesh, direction: Floats) -> tuple[Remainder, list[Plane]]:
 
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000), SPHERE)
-def test_what_limbs_would_do_is_what_the_pieces_that_are_cut_off_measure(seed: int, place: tuple[int, int]) -> None:
+def test_forecasts_of_limbs_equal_measurements_of_the_cut_pieces(seed: int, place: tuple[int, int]) -> None:
     mesh, direction = random_solid(seed), random_direction(*place)
     remainder, planes = _found(mesh, direction)
     assume(planes)
@@ -80,7 +80,7 @@ def two_posts() -> Mesh:
     return shapes.standing(solid + posts[0] + posts[1] + bars[0] + bars[1])
 
 
-def test_each_post_is_a_limb_of_its_own_and_the_other_one_stays() -> None:
+def test_each_post_is_a_separate_limb() -> None:
     mesh = two_posts()
     left = Plane(np.array([0.0, 0.0, 1.0]), 10.0, np.array([[-27.0, -2.0, 20.0]]))
     limbs, rest = cut(solid_of(mesh), left)
@@ -89,7 +89,7 @@ def test_each_post_is_a_limb_of_its_own_and_the_other_one_stays() -> None:
     assert len(rest.decompose()) == 1
 
 
-def test_a_void_goes_with_the_limb_around_it() -> None:
+def test_a_void_belongs_to_the_limb_around_it() -> None:
     hollow = shapes.standing(
         m3.Manifold.cube((60, 20, 2), True).translate((0, 0, 1))
         + m3.Manifold.cube((10, 10, 30), True).translate((-20, 0, 15))

@@ -24,7 +24,7 @@ def nearest_mm(origin: Floats, ray: Floats, mesh: Mesh) -> float:
 
 
 @pytest.mark.parametrize(("seed", "thickness_mm"), [(0, 1.0), (1, 2.5), (2, 6.0), (3, 20.0)])
-def test_the_solid_is_thin_where_a_face_that_looks_the_other_way_is_the_nearest(seed: int, thickness_mm: float) -> None:
+def test_the_solid_is_thin_where_an_opposite_face_is_nearest(seed: int, thickness_mm: float) -> None:
     solid = random_solid(seed)
     remainder = Remainder(solid, np.zeros(len(solid.faces), np.bool_))
     mesh, thin = remainder.facets.mesh, thin_faces(remainder.layout.triangles, thickness_mm)

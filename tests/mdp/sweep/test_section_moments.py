@@ -26,7 +26,7 @@ def _circle(radius: float) -> Floats:
 L_PROFILE = np.array([(0.0, 0.0), (12.0, 0.0), (12.0, 2.0), (3.0, 2.0), (3.0, 20.0), (0.0, 20.0)])
 
 
-def test_a_rectangle_gives_way_first_at_its_corner_in_an_oblique_direction() -> None:
+def test_a_rectangle_yields_first_at_its_corner_in_an_oblique_direction() -> None:
     """A moment at an angle t stresses the corner by cos t / (h b^2 / 6) + sin t / (b h^2 / 6): at most their root sum of
     squares."""
     about_weak, about_strong = 20.0 * 5.0**2 / 6.0, 5.0 * 20.0**2 / 6.0  # 83.3 and 333.3 mm3
@@ -50,11 +50,11 @@ def test_an_l_profile_against_small_squares_in_all_directions() -> None:
 
 
 @given(st.floats(0.0, 360.0), st.floats(-100.0, 100.0), st.floats(-100.0, 100.0))
-def test_where_a_section_lies_and_how_it_is_turned_changes_nothing(turn_deg: float, x: float, y: float) -> None:
+def test_position_and_rotation_of_a_section_change_nothing(turn_deg: float, x: float, y: float) -> None:
     turn = np.radians(turn_deg)
     moved = L_PROFILE @ np.array([(np.cos(turn), np.sin(turn)), (-np.sin(turn), np.cos(turn))]) + (x, y)
     assert _modulus(moved) == pytest.approx(_modulus(L_PROFILE), rel=1e-6)
 
 
-def test_nothing_bears_no_moment() -> None:
+def test_an_empty_section_bears_no_moment() -> None:
     assert greatest_stress_per_moment(np.zeros((0, 4))) == np.inf

@@ -42,7 +42,7 @@ def test_a_plane_through_a_fin_is_at_no_distance_and_one_in_the_block_as_far_as_
     assert _thin(_on_block(fin), UP, 12.0, 20.0, 4.0) == pytest.approx([0.0, 0.0, 6.0], abs=0.11)
 
 
-def test_a_plane_across_a_thin_bridge_is_at_no_distance_and_one_beside_it_as_far_as_its_end() -> None:
+def test_a_plane_has_its_distance_to_a_thin_bridge() -> None:
     posts = [m3.Manifold.cube((8, 8, 20), True).translate((x, 0, 18)) for x in (-11, 11)]
     bridge = m3.Manifold.cube((22, 0.9, 0.9), True).translate((0, 0, 25))
     assert _thin(_on_block(*posts, bridge), SIDE, 0.0, 5.0, 10.0) == pytest.approx([0.0, 0.0, 3.0], abs=0.01)
@@ -86,7 +86,7 @@ def test_a_plane_through_a_ball_is_as_far_from_a_sliver_as_from_the_circle_where
 
 
 @pytest.mark.parametrize(("offset_mm", "distance_mm"), [(1.0, 2.0), (3.5, 0.0), (4.0, 0.0), (9.0, 3.0)])
-def test_a_plane_is_as_far_from_triangles_as_from_their_nearest_corner_and_at_none_where_it_meets_one(
+def test_the_distance_of_a_plane_from_triangles_is_that_of_the_nearest_corner_or_zero(
     offset_mm: float, distance_mm: float
 ) -> None:
     triangles = np.array([[(0, 0, 3), (1, 0, 4), (0, 1, 5)], [(0, 0, 5), (1, 0, 6), (0, 1, 6)]], np.float64)
@@ -102,7 +102,7 @@ def test_only_a_sliver_forbids_a_plane_and_m5_is_less_near_a_fin_than_far_from_i
     assert [table.fragile_mm(row) for row in rows] == pytest.approx([5.0, 1.0, 0.0, 0.0], abs=0.11)
 
 
-def test_no_plane_lies_in_an_overhanging_face_even_where_slivers_are_allowed() -> None:
+def test_no_plane_is_in_an_overhanging_face_even_if_slivers_are_allowed() -> None:
     table = _table(shapes.tee(stem=10, height=40), fragile_mm=0.0)
     rows = [int(np.flatnonzero(table.scored.offset_mm == offset_mm)[0]) for offset_mm in (29.0, 30.0, 31.0)]
     table.check_rows(np.array(rows))

@@ -86,7 +86,7 @@ def found(mesh: Mesh, *given_settings: str) -> Decomposition:
 
 
 @pytest.mark.parametrize("layer_mm", [0.1, 0.2])
-def test_every_row_of_a_front_tells_the_stairs_of_its_parts_which_follow_the_layer_height(layer_mm: float) -> None:
+def test_every_row_of_a_front_has_the_stairs_of_its_parts_by_layer_height(layer_mm: float) -> None:
     mesh = shapes.branch()
     rows = found(mesh, f"process.layer_height_mm={layer_mm}").front
     assert len(rows) > 1

@@ -159,13 +159,13 @@ def test_the_thinnest_tower_counts_and_not_the_sum_of_the_sections() -> None:
     assert _contact_areas(_two_towers(1.5, 15))[[4, 14, 26]] == pytest.approx([800.0, 1.5 * 1.5, 100.0])
 
 
-def test_a_fragment_may_stand_on_little() -> None:
+def test_a_fragment_may_have_a_small_base() -> None:
     mesh = _two_towers(1.5, 5.5)
     assert _contact_areas(mesh)[[11, 13]] == pytest.approx([2.25, 100.0])
     assert _contact_areas(mesh, 0.0)[13] == pytest.approx(2.25)
 
 
-def test_a_piece_on_two_legs_stands_on_both() -> None:
+def test_a_piece_on_two_legs_has_both_as_its_base() -> None:
     legs = m3.Manifold.cube((3, 3, 20)) + m3.Manifold.cube((3, 3, 20)).translate((20, 0, 0))
     table = shapes.standing(legs + m3.Manifold.cube((23, 3, 3)).translate((0, 0, 18)))
     assert _contact_areas(table)[9] == pytest.approx(18.0)

@@ -19,7 +19,7 @@ def _lost(least_offset_mm: float) -> tuple[Remainder, np.ndarray]:
     return remainder, unavoidable_faces(remainder, chosen, least, threshold(45.0))
 
 
-def test_every_overhang_is_saved_where_planes_may_lie_anywhere_and_none_where_they_may_lie_nowhere() -> None:
+def test_free_planes_save_every_overhang_and_forbidden_ones_none() -> None:
     assert not _lost(-np.inf)[1].any()
     remainder, lost = _lost(np.inf)
     assert (lost == remainder.facets.faces.risky).all()
@@ -37,7 +37,7 @@ def test_the_faces_that_are_lost_are_those_that_a_plain_search_over_all_directio
     assert (lost == (facets.faces.risky & ~saved)).all()
 
 
-def test_what_no_cut_can_save_is_split_by_a_plane_and_bounds_every_cost() -> None:
+def test_unavoidable_support_is_split_by_a_plane_and_bounds_every_cost() -> None:
     problem = Problem(shapes.ball(), load(settings=(*SETTINGS, "search.count_platform_faces=true")))
     table = problem.table(problem.root, described=True)
     rows = np.arange(len(table.reason), dtype=np.int32)
@@ -50,7 +50,7 @@ def test_what_no_cut_can_save_is_split_by_a_plane_and_bounds_every_cost() -> Non
     assert 0.0 < total < 1.0
 
 
-def test_what_a_cut_loses_is_wasted_unavoidable_or_its_seam() -> None:
+def test_the_loss_of_a_cut_is_wasted_unavoidable_or_its_seam() -> None:
     problem = Problem(shapes.branch(), load(settings=(*SETTINGS, "search.seam_mm=0.8", "search.objective=scar")))
     table = problem.table(problem.root, described=True)
     rows = np.arange(len(table.reason), dtype=np.int32)

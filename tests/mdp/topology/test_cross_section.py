@@ -139,7 +139,7 @@ def test_cleaning_reaches_over_the_section_by_no_more_than_a_twentieth_of_a_line
     assert 0.05 * profile().process.line_width_mm >= CLOSING_MM
 
 
-def test_a_level_face_in_a_cutting_plane_belongs_to_the_layer_that_has_what_lies_above_it() -> None:
+def test_a_level_face_in_a_cutting_plane_belongs_to_the_section_above_it() -> None:
     cap = from_manifold(m3.Manifold.cube((20.0, 20.0, 5.0)).translate((0.0, 0.0, 10.0)))
     cuts, down = np.array([8.0, 10.0, 12.0]), cap.normals[:, 2] < -0.9
     first = next(layer for layer, loops in enumerate(cross_sections(cap, cuts)) if area(loops) > 0.0)

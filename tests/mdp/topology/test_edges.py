@@ -26,7 +26,7 @@ def runs(corners: list[list[int]]) -> list[tuple[int, int]]:
 
 
 @given(triangles)
-def test_an_edge_has_as_many_faces_as_run_along_it_either_way_and_is_balanced_where_both_ways_are_as_many(
+def test_an_edge_counts_its_faces_and_is_balanced_if_both_directions_are_equal(
     corners: list[list[int]],
 ) -> None:
     half = runs(corners)
@@ -52,7 +52,7 @@ def test_half_edges_by_edge_are_each_there_once_and_twins_are_the_two_of_an_edge
 
 
 @given(triangles)
-def test_vertices_hang_together_where_a_graph_of_the_edges_says_so(corners: list[list[int]]) -> None:
+def test_connected_vertices_equal_those_of_a_graph_library(corners: list[list[int]]) -> None:
     whole = nx.Graph(runs(corners))
     whole.add_nodes_from(range(7))
     least = {v: min(component) for component in nx.connected_components(whole) for v in component}
@@ -78,7 +78,7 @@ def test_sets_that_were_joined_are_known_by_their_least_member(pairs: list[tuple
 
 
 @pytest.mark.parametrize(("mesh", "shells"), [(box(), 1), (hollow(), 2)])
-def test_a_void_is_a_shell_of_its_own(mesh: Mesh, shells: int) -> None:
+def test_a_void_is_a_separate_shell(mesh: Mesh, shells: int) -> None:
     assert len(set(vertex_components(len(mesh.vertices), mesh.faces).tolist())) == shells
     assert len(edges_of(mesh.faces.astype(np.int64)).unbalanced) == 0
 
@@ -101,7 +101,7 @@ def test_no_faces_have_no_neighbours() -> None:
 
 
 @given(triangles)
-def test_half_edges_are_paired_with_those_that_run_the_other_way_in_the_order_of_their_faces(corners: list[list[int]]) -> None:
+def test_half_edges_are_paired_with_opposite_ones_in_face_order(corners: list[list[int]]) -> None:
     across, half = opposites(np.array(corners, np.int32).reshape(-1, 3)), runs(corners)
     for a, b in set(half):
         there, back = ([h for h, run in enumerate(half) if run == ends] for ends in ((a, b), (b, a)))

@@ -100,7 +100,7 @@ def test_a_filament_setting_becomes_ours(values: dict[str, str], key: str, value
         ),
     ],
 )
-def test_what_cannot_be_said_here_is_left_with_the_reason(values: dict[str, str], why: str) -> None:
+def test_settings_without_an_equivalent_are_listed_with_the_reason(values: dict[str, str], why: str) -> None:
     (row,) = (row for row in imported(config(**values), "process").rows if row.name == next(iter(values)))
     assert not row.taken
     assert why in row.how
@@ -111,7 +111,7 @@ def test_a_fan_over_bridges_that_is_as_elsewhere_is_left() -> None:
     assert (row.taken, row.how) == (False, "below 0: as elsewhere")
 
 
-def test_pressure_advance_on_a_condition_is_left_to_the_person() -> None:
+def test_conditional_pressure_advance_is_left_to_the_user() -> None:
     block = '"{if nozzle_diameter[0]==0.4}M900 K0.05{endif}"'
     (row,) = imported(config(start_filament_gcode=block), "material").rows
     assert "on a condition" in row.how
@@ -152,7 +152,7 @@ def test_every_key_that_a_rule_fills_is_one_of_ours() -> None:
     assert {key for key, _, _ in PROCESS_RULES if key} <= ours
 
 
-def test_nothing_of_theirs_and_nothing_of_ours_is_passed_over_in_silence() -> None:
+def test_every_foreign_setting_and_every_own_key_is_accounted_for() -> None:
     theirs = config(layer_height="0.2", wipe_tower="1")
     profile = imported(theirs, "process")
     assert unused(theirs) == ["wipe_tower"]
@@ -261,7 +261,7 @@ OF_NOZZLE = "a percentage of the nozzle, which the file does not state"
         ),
     ],
 )
-def test_a_width_in_percent_of_what_the_file_does_not_tell_is_left_with_the_reason(
+def test_a_width_in_percent_of_an_unknown_value_is_listed_with_the_reason(
     made: Callable[[Mapping[str, str]], Config], values: dict[str, str], name: str, text: str, why: str
 ) -> None:
     row = reported(made(values), name)
@@ -279,7 +279,7 @@ def test_a_width_in_percent_of_what_the_file_does_not_tell_is_left_with_the_reas
         (cura.of_values, {"wall_thickness": "1.2", "line_width": "0.4"}, []),
     ],
 )
-def test_a_setting_that_filled_a_key_is_not_told_among_the_unused(
+def test_a_converted_setting_is_not_listed_as_unused(
     made: Callable[[Mapping[str, str]], Config], values: dict[str, str], rest: list[str]
 ) -> None:
     assert unused(made(values)) == rest
@@ -299,11 +299,11 @@ def test_a_setting_that_filled_a_key_is_not_told_among_the_unused(
         ({"retraction_hop": "=foo", "retraction_hop_enabled": "True"}, ["retraction_hop (a formula)", "retraction_hop_enabled"]),
     ],
 )
-def test_a_setting_of_cura_that_does_not_hold_is_told_with_the_reason(values: dict[str, str], rest: list[str]) -> None:
+def test_an_inactive_setting_of_cura_is_listed_with_the_reason(values: dict[str, str], rest: list[str]) -> None:
     assert unused(cura.of_values(values)) == rest
 
 
-def test_what_a_text_becomes_is_told_where_nothing_is_taken() -> None:
+def test_a_converted_text_is_shown_when_it_is_not_used() -> None:
     row = reported(cura.of_values({"support_angle": "90"}), "support_angle")
     assert (row.text, row.taken, row.how) == ("90", False, "is 0 here; 0: found by the slicer")
 
@@ -313,6 +313,6 @@ def test_a_width_below_zero_is_left_with_the_reason() -> None:
     assert (row.text, row.taken, row.how) == ("-10%", False, "is -0.04 here; is less than 0")
 
 
-def test_of_two_settings_for_one_key_the_second_keeps_its_own_reason() -> None:
+def test_the_second_of_two_settings_for_one_key_keeps_its_own_reason() -> None:
     row = reported(cura.of_values({"outer_inset_first": "=True", "inset_direction": "outside_in"}), "inset_direction")
     assert (row.text, row.how) == ("outside_in", "")

@@ -35,7 +35,7 @@ def config_inside(file: Path) -> Config:
     return of_values(values)
 
 
-def test_what_is_on_top_of_a_stack_holds_wherever_it_stands_in_the_file(tmp_path: Path) -> None:
+def test_the_top_of_a_stack_wins_wherever_it_is_in_the_file(tmp_path: Path) -> None:
     containers = {
         "changes": "layer_height = 0.2\nspeed_travel = 150",
         "quality": "layer_height = 0.3\nspeed_travel = 90\nraft_margin = 3",
@@ -70,7 +70,7 @@ def test_a_byte_order_mark_at_the_head_of_a_container_is_no_part_of_it(tmp_path:
     assert config_inside(file).number("perimeters") == 3
 
 
-def test_a_material_says_its_kind_and_temperature_below_what_a_person_has_set(tmp_path: Path) -> None:
+def test_a_material_gives_kind_and_temperature_below_user_settings(tmp_path: Path) -> None:
     stacks = {"a.extruder": ("position = 0", ["user", "petg_acme_printer_0.4"])}
     config = config_inside(project(tmp_path / "a.3mf", {"user": "material_bed_temperature = 70"}, stacks))
     assert config.text("filament_type") == "PETG"
@@ -103,7 +103,7 @@ def test_a_material_inherits_from_the_shipped_one_that_its_kind_names(kind: str,
         ({"speed_infill": "=9 / 0"}, "infill_speed", None),
     ],
 )
-def test_formulas_are_worked_out_where_what_they_name_is_told(values: dict[str, str], key: str, expected: float | None) -> None:
+def test_formulas_are_evaluated_if_their_variables_are_known(values: dict[str, str], key: str, expected: float | None) -> None:
     assert of_values(values).number(key) == expected
 
 

@@ -142,7 +142,7 @@ def test_json_settings_that_are_cut_off_are_refused(tmp_path: Path) -> None:
         read_config(file)
 
 
-def test_a_preset_of_orcaslicer_has_what_the_files_beside_it_say(tmp_path: Path) -> None:
+def test_a_preset_of_orcaslicer_inherits_from_the_files_beside_it(tmp_path: Path) -> None:
     parent = {"type": "process", "name": "base", "wall_loops": "2", "line_width": "110%", "nozzle_diameter": ["0.4"]}
     written(tmp_path, "base.json", json.dumps(parent))
     child = {"type": "process", "name": "0.16 mine", "inherits": "base", "layer_height": "0.16", "seam_position": "back"}
@@ -156,7 +156,7 @@ def test_a_preset_of_orcaslicer_has_what_the_files_beside_it_say(tmp_path: Path)
     assert config.process == "0.16 mine"
 
 
-def test_a_person_s_own_preset_has_what_the_vendor_s_says_and_its_printer_s_nozzle(tmp_path: Path) -> None:
+def test_a_user_preset_inherits_from_the_vendor_and_has_the_nozzle_of_its_printer(tmp_path: Path) -> None:
     vendor, own = tmp_path / "system" / "Acme", tmp_path / "user" / "default" / "process"
     for folder in (vendor / "process", vendor / "machine", own):
         folder.mkdir(parents=True)
@@ -169,21 +169,21 @@ def test_a_person_s_own_preset_has_what_the_vendor_s_says_and_its_printer_s_nozz
     assert (config.number("perimeters"), config.number("extrusion_width"), config.unknown) == (3, 0.88, ())
 
 
-def test_presets_for_printers_with_several_nozzles_say_none(tmp_path: Path) -> None:
+def test_presets_for_several_nozzle_sizes_state_none(tmp_path: Path) -> None:
     for nozzle in ("0.4", "0.6"):
         written(tmp_path, f"Acme {nozzle}.json", json.dumps({"type": "machine", "name": nozzle, "nozzle_diameter": [nozzle]}))
     mine = {"type": "process", "name": "mine", "line_width": "110%", "compatible_printers": ["Acme 0.4", "Acme 0.6"]}
     assert read_config(written(tmp_path, "mine.json", json.dumps(mine))).number("extrusion_width") is None
 
 
-def test_a_parent_that_is_nowhere_beside_it_is_told(tmp_path: Path) -> None:
+def test_a_missing_parent_preset_is_reported(tmp_path: Path) -> None:
     child = {"type": "filament", "name": "PLA", "inherits": "Generic PLA @System", "nozzle_temperature": ["215"]}
     config = read_config(written(tmp_path, "PLA.json", json.dumps(child)))
     assert config.unknown == ("inherits Generic PLA @System",)
     assert config.number("temperature") == 215
 
 
-def test_orcaslicer_heats_the_bed_of_the_plate_that_lies_on_it(tmp_path: Path) -> None:
+def test_orcaslicer_heats_the_bed_for_the_chosen_plate(tmp_path: Path) -> None:
     text = "; nozzle_temperature = 220\n; curr_bed_type = Textured PEI Plate\n; hot_plate_temp = 60\n; textured_plate_temp = 65\n"
     assert read_config(written(tmp_path, "orca.gcode", text)).number("bed_temperature") == 65
 
@@ -233,7 +233,7 @@ def test_the_layers_of_cura_s_raft_are_added_up(tmp_path: Path, values: str, lay
         ("noise.gcode", bytes(range(256)) * 40, "holds no settings"),
     ],
 )
-def test_what_is_no_configuration_is_refused_in_one_sentence(tmp_path: Path, name: str, content: bytes, sentence: str) -> None:
+def test_an_invalid_configuration_is_refused_in_one_sentence(tmp_path: Path, name: str, content: bytes, sentence: str) -> None:
     (tmp_path / name).write_bytes(content)
     with pytest.raises(ProfileError, match=sentence):
         read_config(tmp_path / name)

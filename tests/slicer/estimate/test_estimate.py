@@ -65,12 +65,12 @@ def test_slow_strokes_take_the_time_of_their_length() -> None:
         ("process.support=none", "process.support=auto"),
     ],
 )
-def test_what_asks_more_of_the_machine_takes_longer(less: str, more: str) -> None:
+def test_more_demanding_settings_take_longer(less: str, more: str) -> None:
     small = tee(stem=6.0, arm=24.0, height=20.0)
     assert of(small, less).time_s < of(small, more).time_s
 
 
-def test_support_is_told_apart_and_there_only_where_something_hangs() -> None:
+def test_support_is_estimated_separately_and_only_under_overhangs() -> None:
     assert of(box()).support_mm3 == 0.0
     bare = ("process.skirt_loops=0", "process.small_base_brim_mm=0", "process.layer_height_mm=0.3")
     supported, alone = of(tee(), *bare), of(tee(), *bare, "process.support=none")
@@ -95,7 +95,7 @@ def test_a_small_layer_lasts_as_long_as_it_has_to_cool() -> None:
 
 
 @pytest.mark.parametrize(("where", "setting"), [("platform", "first_layer_flow"), ("base", "interface_flow")])
-def test_the_first_layer_has_the_flow_of_what_it_lies_on(where: str, setting: str) -> None:
+def test_the_first_layer_has_the_flow_for_plate_or_plastic(where: str, setting: str) -> None:
     below, above = cut(box(20, 20, 20), ((0.0, 0.0, 1.0), 10.0))
     part = below if where == "platform" else above
     plain, more = (
@@ -184,7 +184,7 @@ def test_a_raft_takes_as_long_as_in_the_dry_run(layers: int) -> None:
     assert estimate(part, settings).time_s == pytest.approx(build(decomposition, settings).run.time_s, rel=0.03)
 
 
-def test_the_same_parts_are_always_estimated_alike() -> None:
+def test_estimates_of_the_same_parts_are_deterministic() -> None:
     parts = cut(comb(), LEANING)
     assert estimate(parts, profile()) == estimate(parts, profile())
 

@@ -38,7 +38,7 @@ def test_a_ledge_half_way_up_has_skin_below_it() -> None:
 
 @settings(max_examples=50)
 @given(st.integers(0, 10**6), st.integers(1, 300), st.integers(1, 40))
-def test_every_run_of_layers_has_samples_of_its_own(seed: int, count: int, samples: int) -> None:
+def test_every_run_of_layers_has_its_own_samples(seed: int, count: int, samples: int) -> None:
     weight = np.random.default_rng(seed).uniform(0.01, 5.0, count)
     layers, begins = choose_layers(weight, samples)
     of_runs = [layers[(begin <= layers) & (layers < end)] for begin, end in pairwise([*begins.tolist(), count])]
@@ -54,13 +54,13 @@ def test_layers_of_more_weight_are_sampled_more_densely() -> None:
     assert (layers[1:] < 50).mean() == pytest.approx(0.9, abs=0.05)
 
 
-def test_a_layer_much_heavier_than_its_neighbours_stands_for_itself_alone() -> None:
+def test_a_layer_much_heavier_than_its_neighbours_represents_only_itself() -> None:
     layers, begins = choose_layers(np.where(np.arange(100) == 50, 40.0, 1.0), 10)
     assert 50 in layers
     assert {50, 51} <= set(begins.tolist())
 
 
-def test_what_alternates_from_layer_to_layer_is_sampled_as_often_one_way_as_the_other() -> None:
+def test_alternating_layers_are_sampled_equally_often() -> None:
     layers, _ = choose_layers(np.ones(200), 10)
     assert (layers[1:] % 2).mean() == 0.5
 

@@ -43,7 +43,7 @@ def test_a_square_is_slowed_at_its_corners_to_the_junction_speed() -> None:
     assert seconds(SQUARE) == pytest.approx(ends + between, rel=1e-6)
 
 
-def test_a_travel_takes_its_time_and_one_that_retracts_stands_still_before_and_after() -> None:
+def test_a_travel_takes_its_time_plus_that_of_its_retraction() -> None:
     line = np.array([[0.0, 0.0], [10.0, 0.0]])
     ramp, travel = PROFILE.machine.x.acceleration_mm_s2, PROFILE.process.travel_speed_mm_s
     apart = line + np.array([40.0, 0.0])
@@ -55,7 +55,7 @@ def test_a_travel_takes_its_time_and_one_that_retracts_stands_still_before_and_a
     assert seconds(line, apart) < standing - 2.0 * twice_s
 
 
-def test_the_way_from_the_layer_below_counts() -> None:
+def test_the_travel_from_the_layer_below_counts() -> None:
     line = np.array([[0.0, 0.0], [0.0, 10.0]])
     assert seconds(line, tip=np.array([-30.0, 0.0])) > seconds(line) + 30.0 / PROFILE.process.travel_speed_mm_s
 

@@ -39,7 +39,7 @@ def apart_deg(a: float, b: float) -> float:
 
 @settings(max_examples=40, deadline=None)
 @given(st.floats(3, 30), st.floats(2, 30), st.floats(0, 180))
-def test_lines_cross_the_gap_at_right_angles_however_it_lies(length: float, span: float, turn: float) -> None:
+def test_lines_cross_a_gap_of_any_direction_at_right_angles(length: float, span: float, turn: float) -> None:
     over = bridge_over(*gap(length, span, turn))
     assert apart_deg(over.angle_deg, turn + 90) < 0.1
     assert over.longest_mm == pytest.approx(span, abs=0.01)
@@ -94,7 +94,7 @@ def test_a_ledge_is_printed_outwards_from_its_only_bank() -> None:
     assert not over.carries(100)
 
 
-def test_nothing_to_hold_on_to_is_no_bridge() -> None:
+def test_a_region_without_anchors_is_not_a_bridge() -> None:
     banks = index_edges(Polygons.square((5, 5)).translate((20, 0)))
     assert find_bridge(Polygons.square((5, 5)), banks, WIDTH) is None
 
@@ -119,7 +119,7 @@ def test_bridges_have_their_own_speed_and_flow_and_end_on_the_banks() -> None:
 
 
 @pytest.mark.parametrize("angle_deg", [60.0, 180.0])
-def test_bridges_run_in_the_direction_that_is_asked_for(angle_deg: float) -> None:
+def test_bridges_run_in_the_direction_that_is_set(angle_deg: float) -> None:
     """At 180 degrees, along the banks of a gap, no bridge is held; without a set angle, portals are bridged along x."""
     hanging, banks = gap(20, 5, 0)
     span = find_bridge(hanging, index_edges(offset(banks, 0.25 * WIDTH)), WIDTH, angle_deg)
@@ -177,7 +177,7 @@ def bridged_layers(*settings: str) -> dict[int, list[Path]]:
     return {k: paths for k, paths in bridges.items() if paths}
 
 
-def test_the_first_skin_over_sparse_infill_is_a_bridge_with_speed_fan_and_flow_of_its_own() -> None:
+def test_the_first_skin_over_sparse_infill_is_a_bridge_with_its_own_speed_fan_and_flow() -> None:
     ((layer, paths),) = bridged_layers(*OWN).items()
     assert layer == 20 - 4
     assert {(path.speed_mm_s, path.fan) for path in paths} == {(33.0, 0.8)}

@@ -51,7 +51,7 @@ def test_a_stroke_ends_on_the_plastic_that_is_nearest(begin: float, end: float, 
     assert reach(skin) == pytest.approx(held, abs=0.5 * WIDTH)
 
 
-def test_a_stroke_over_nothing_is_left_out_and_what_follows_it_begins_anew() -> None:
+def test_a_stroke_over_nothing_is_left_out_and_the_next_one_begins_again() -> None:
     chain = [bead(Kind.TOP_SKIN, (x, -1.0), (x, 1.0), follows=x > 5.0) for x in (5.0, 5.4, 12.0)]
     left = hold_ends([bead(Kind.SKIN, (0.0, 0.0), (0.0, 3.0)), *chain], plastic_of([rail(0.0), rail(12.0)]), MODEL, MODEL, WIDTH)
     assert [float(one.points[0, 0]) for one in left] == [0.0, 12.0]
@@ -78,7 +78,7 @@ def test_a_bridge_may_end_where_the_model_has_nothing_below() -> None:
     assert reach(hold_ends(bridge, plastic_of([rail(0.0)]), MODEL, Polygons.square((2.0, 20.0), True), WIDTH)) == (0.0, 5.0)
 
 
-def test_a_stroke_is_not_extended_out_of_the_outline_of_its_own_layer() -> None:
+def test_a_stroke_is_not_extended_beyond_the_outline_of_its_layer() -> None:
     own = Polygons.square((6.0, 20.0), True)  # it ends at x 3, above the middle of the last rail
     below = plastic_of([rail(0.0), rail(2.0), rail(3.0)])
     skin = hold_ends([bead(Kind.SKIN, (0.0, 0.0), (2.6, 0.0))], below, own, MODEL, WIDTH)
@@ -94,7 +94,7 @@ def test_wide_beads_carry_what_begins_farther_from_their_middle(rail_mm: float, 
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(POINTS, min_size=2, max_size=6, unique=True), st.lists(st.floats(-8, 8), min_size=1, max_size=4))
-def test_under_the_last_width_of_a_stroke_lies_plastic(points: list[tuple[float, float]], rails: list[float]) -> None:
+def test_the_last_width_of_a_stroke_is_on_plastic(points: list[tuple[float, float]], rails: list[float]) -> None:
     below = [rail(x) for x in rails]
     plastic = shapely.union_all([shapely.LineString(one.points).buffer(0.5 * WIDTH, cap_style="flat") for one in below])
     for held in hold_ends([bead(Kind.SKIN, *points)], plastic_of(below), MODEL, MODEL, WIDTH):
@@ -142,7 +142,7 @@ def test_an_anchor_grows_from_layer_to_layer() -> None:
 
 @pytest.mark.parametrize("walls", [1, 2])
 @pytest.mark.parametrize("density", [0.0, 0.02])
-def test_a_roof_spans_an_empty_inside_whatever_walls_there_are(walls: int, density: float) -> None:
+def test_a_roof_spans_an_empty_inside_with_any_number_of_walls(walls: int, density: float) -> None:
     box = standing(m3.Manifold.cube((30.0, 30.0, 4.0)))
     layers = slice_part(whole(box), profile(f"process.walls={walls}", f"process.infill_density={density}")).layers
     roof_mm3 = [layer.volumes_mm3.sum() for layer in layers[-4:]]

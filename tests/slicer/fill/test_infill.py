@@ -81,13 +81,13 @@ def test_rectilinear_lines_turn_by_a_right_angle_from_layer_to_layer() -> None:
     assert abs(a @ b) < 1e-6 * np.hypot(*a) * np.hypot(*b)
 
 
-def test_grid_lines_lie_on_each_other_in_all_layers() -> None:
+def test_grid_lines_are_on_each_other_in_all_layers() -> None:
     layers = [filled(square(), "grid", 0.2, layer=k) for k in (0, 1)]
     assert [b.points.tobytes() for b in layers[0]] == [b.points.tobytes() for b in layers[1]]
 
 
 @pytest.mark.parametrize("height", [0.4, 3.0, 7.7, 12.1])
-def test_gyroid_lines_lie_on_the_minimal_surface(height: float) -> None:
+def test_gyroid_lines_are_on_the_minimal_surface(height: float) -> None:
     unit = GYROID_LENGTH * 0.4 / 0.2 / (2 * np.pi)
     turned_deg, draw = gyroid(height, 0.0, 0.4, 0.2)
     x, y = (draw((-20, -20, 20, 20))[0] @ rotation_2d(turned_deg).T / unit).T
@@ -95,7 +95,7 @@ def test_gyroid_lines_lie_on_the_minimal_surface(height: float) -> None:
     assert np.abs(np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)).max() < 1e-9
 
 
-def test_cubic_lines_lie_on_planes_at_right_angles() -> None:
+def test_cubic_lines_are_on_perpendicular_planes() -> None:
     normals = [
         np.array([np.sqrt(2 / 3) * np.cos(a), np.sqrt(2 / 3) * np.sin(a), -np.sqrt(1 / 3)]) for a in np.radians((120, 240, 0))
     ]

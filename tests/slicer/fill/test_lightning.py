@@ -70,7 +70,7 @@ def test_no_branch_leans_farther_from_the_layer_below_than_plastic_may(shape: tu
         assert len(points) == 0 or shapely.distance(points, below).max() < 2.0 * LEAN + 0.01, k
 
 
-def test_every_branch_lies_inside(shape: tuple[list[Polygons], list[list[Floats]]]) -> None:
+def test_every_branch_is_inside(shape: tuple[list[Polygons], list[list[Floats]]]) -> None:
     for inside, lines in zip(*shape, strict=True):
         room = as_shapely(inside).buffer(1e-3)
         assert all(room.covers(shapely.linestrings(line)) for line in lines)
@@ -83,7 +83,7 @@ def test_deep_below_a_roof_there_is_no_infill() -> None:
     assert len(lines[198]) > 0
 
 
-def test_where_nothing_is_solid_above_nothing_is_planned() -> None:
+def test_without_a_solid_layer_above_nothing_is_planned() -> None:
     assert lightning_lines([square(20.0)] * 5, [Polygons()] * 5, CELL, np.full(5, HEIGHT)) == [[]] * 5
 
 

@@ -86,7 +86,7 @@ def test_order_loses_no_line(holes: list[tuple[float, float, float]]) -> None:
     assert float((rows[0][:, 2] - rows[0][:, 1]).sum()) == pytest.approx(float((rows[1][:, 2] - rows[1][:, 1]).sum()), rel=0.01)
 
 
-def test_without_it_lines_meet_from_both_sides_of_a_hole() -> None:
+def test_without_monotonic_order_lines_meet_from_both_sides_of_a_hole() -> None:
     beads = skin_beads(plate([(0, 0, 4)]), Kind.TOP_SKIN, SolidLines(45.0, WIDTH, HEIGHT))
     assert out_of_order(lines_of(beads, 45.0)) > 0
 

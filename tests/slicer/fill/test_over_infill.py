@@ -44,7 +44,7 @@ def test_a_skin_between_two_lines_of_infill_grows_to_both_and_no_farther() -> No
     assert grown.uncut.area() == pytest.approx(grown.sparse.area())  # the skins' growth is not plastic that a cut costs
 
 
-def test_a_skin_grows_along_its_lines_whichever_way_these_run() -> None:
+def test_a_skin_grows_along_its_lines_in_any_direction() -> None:
     turned = [line @ np.array([[0.0, 1.0], [-1.0, 0.0]]) for line in INFILL]
     left, low, right, high = anchored(region(block(0.0, 3.0, 2.0)), INSIDE, turned, 90.0, WIDTH, CELL).solid.bounds()
     assert (left, right) == pytest.approx((-1.0, 1.0), abs=WIDTH)
@@ -127,7 +127,7 @@ def test_no_stroke_of_skin_under_pockets_ends_with_nothing_under_its_last_width(
     assert max(farthest_end_mm(below.paths, layer.paths) for below, layer in pairwise(layers)) == 0.0
 
 
-def test_the_bridge_over_a_hollow_goes_on_to_the_walls_around_it() -> None:
+def test_the_bridge_over_a_hollow_extends_to_the_walls_around_it() -> None:
     hollow = m3.Manifold.cube((26, 20, 10)) - m3.Manifold.cube((20, 14, 6)).translate((3, 3, 2))
     ceiling = slice_part(whole(standing(hollow)), profile(*BARE)).layers[40]
     lines = np.concatenate([path.points for path in ceiling.paths if path.kind == Kind.BRIDGE])

@@ -54,7 +54,7 @@ def test_a_step_is_top_skin_where_it_is_bare_and_solid_below_it() -> None:
     assert by_layer[1] == (0, 0, 400)
 
 
-def test_what_is_bare_goes_on_as_top_skin_under_the_walls_around_it() -> None:
+def test_a_bare_top_continues_as_top_skin_under_the_walls_around_it() -> None:
     floor = [square(20)] * 6 + [square(20) - square(8)] * 4
     insides = [offset(section, -3 * WIDTH) for section in floor]
     region = alone(floor, insides, None, process(top=2, walls=3))[5]
@@ -77,7 +77,7 @@ def test_no_wall_begins_on_sparse_infill(side: float, aside: float, walls: int, 
 
 
 @pytest.mark.parametrize(("aside", "solid"), [(0.3, False), (0.35, True)])
-def test_a_wall_that_hardly_touches_the_one_below_lies_on_solid_layers(aside: float, solid: bool) -> None:
+def test_a_wall_that_hardly_touches_the_one_below_is_on_solid_layers(aside: float, solid: bool) -> None:
     sections = [square(24)] * 6 + [square(24) - Polygons.square((aside, 24)).translate((12 - aside, -12))] * 4
     below = alone(sections, [offset(section, -3 * WIDTH) for section in sections], None, process(top=2, walls=3))[5]
     wall = Polygons.square((aside, 20)).translate((12 - 3 * WIDTH - aside, -10))
@@ -90,7 +90,7 @@ def test_an_overhang_gets_bottom_layers() -> None:
     assert by_layer[5] == (0, 0, 400)
 
 
-def test_a_part_on_plastic_has_as_many_solid_layers_as_it_is_asked_for() -> None:
+def test_a_part_on_plastic_has_the_number_of_solid_layers_that_is_set() -> None:
     tower = [square(10)] * 6
     assert areas(tower, beneath=square(10), top=1)[:2] == [(0, 100, 0), (0, 0, 100)]
     sparse = alone(tower, tower, square(10), process(top=1, interface_bottom_layers=0))
@@ -105,7 +105,7 @@ def test_grooves_are_filled_by_a_solid_first_layer() -> None:
     assert [region.sparse.area() for region in by_layer[:2]] == [0, 100]
 
 
-def test_a_later_part_lies_on_as_many_solid_layers_as_an_interface_has() -> None:
+def test_a_later_part_is_on_the_solid_layers_of_an_interface() -> None:
     tower, keys = [square(20)] * 6, process(top=3, interface_top_layers=2)
     later = [Polygons()] * 6 + [square(20)] * 3
     by_layer = regions(tower, Cover(tower, tower, [Polygons()] * 2, later[6:], later), False, keys)
@@ -113,7 +113,7 @@ def test_a_later_part_lies_on_as_many_solid_layers_as_an_interface_has() -> None
     assert [region.top.area() for region in by_layer] == [0] * 6, "what will be covered is no top skin"
 
 
-def test_where_the_model_ends_beside_a_later_part_the_skin_is_as_thick_as_everywhere() -> None:
+def test_the_skin_beside_a_later_part_is_as_thick_as_everywhere() -> None:
     tower, keys = [square(20)] * 8, process(top=4, bottom=0, interface_top_layers=1)
     later = [Polygons()] * 8 + [square(10)] * 4
     by_layer = regions(tower, Cover(tower, tower, [], later[8:], later), False, keys)
@@ -152,7 +152,7 @@ def test_thin_layers_get_more_of_them_for_the_least_thickness(height: float, lay
     assert shell_layers(keys) == layers
 
 
-def test_no_layers_asked_for_are_none_however_thick() -> None:
+def test_zero_solid_layers_are_none_at_any_thickness() -> None:
     assert shell_layers(process(0, 0, top_thickness_mm=3, bottom_thickness_mm=3)) == (0, 0)
 
 
@@ -167,7 +167,7 @@ def test_every_vertical_line_meets_enough_wall_or_skin_below_a_slope(step: float
 
 
 @pytest.mark.parametrize("count", [1, 2, 3, 5, 12, 1000])
-def test_sparse_is_what_each_of_so_many_layers_below_covers(count: int) -> None:
+def test_sparse_infill_is_where_all_solid_layers_below_cover(count: int) -> None:
     layers = [square(10).translate((k * 7 % 5, k * 3 % 4)) for k in range(11)]
     for i, region in enumerate(alone(layers, layers, None, process(0, count, solid_below_mm2=0))):
         expected = layers[i]

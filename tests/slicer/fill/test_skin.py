@@ -47,7 +47,7 @@ def open_mm2(area: Polygons, solid: SolidLines) -> float:
 
 @pytest.mark.parametrize("pattern", ["monotonic", "rectilinear"])
 @pytest.mark.parametrize("angle", [30.0, 45.0, 60.0])
-def test_skins_that_are_seen_leave_less_than_half_as_much_open_beside_the_walls(angle: float, pattern: SkinPattern) -> None:
+def test_visible_skins_leave_less_than_half_as_much_open_beside_the_walls(angle: float, pattern: SkinPattern) -> None:
     slot = Polygons.square((40.0, 4.0))
     seen, hidden = (open_mm2(slot, SolidLines(angle, WIDTH, HEIGHT, OVERLAP, pattern, seen)) for seen in (True, False))
     assert 0.0 < seen < 0.5 * hidden
@@ -69,7 +69,7 @@ def test_no_line_is_a_dot_in_a_corner() -> None:
     assert np.hypot(*np.diff(bead.points, axis=0).T).min() > 0.2
 
 
-def test_specks_beside_lines_are_filled_where_they_are_seen_only() -> None:
+def test_specks_beside_lines_are_filled_only_where_visible() -> None:
     speck = Polygons.square((0.4 * WIDTH, 2.0 * WIDTH))  # 0.8 of the width squared
     area, line = (
         Polygons.square((10.0, WIDTH)) + speck.translate((4.0, WIDTH)),
@@ -101,7 +101,7 @@ def test_the_lines_of_a_concentric_skin_are_squares_in_a_square_a_spacing_apart(
         ("skin_angle_deg=0", 5),
     ],
 )
-def test_patterns_and_angle_of_skins_hold_where_they_are_asked_for(key: str, layer: int) -> None:
+def test_patterns_and_angle_of_skins_apply_where_they_are_set(key: str, layer: int) -> None:
     """All lines of a block's skin are straight along x or y there; in a skin at 45 degrees none is."""
     sliced = slice_part(whole(box(12, 12, 2)), profile(*SOLID, f"process.{key}"))
 

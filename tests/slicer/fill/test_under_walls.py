@@ -35,7 +35,7 @@ def test_no_inner_wall_of_a_cone_has_its_middle_over_air(walls: int, inward: flo
 
 
 @pytest.mark.parametrize(("inward", "more"), [(0.3, False), (0.6, True)])
-def test_a_wall_that_stands_on_the_one_below_needs_no_line(inward: float, more: bool) -> None:
+def test_a_wall_on_the_wall_below_needs_no_line(inward: float, more: bool) -> None:
     layers = cone(inward)[6:12]
     beside = [
         plastic(layer, Kind.INNER_WALL).buffer(0.6 * LINE).intersection(shapely.MultiLineString(infill)).length

@@ -38,7 +38,7 @@ def clipped(lines: list[Floats], area: Polygons) -> Pieces:
 
 @few
 @given(seeds)
-def test_what_is_left_of_lines_is_shapely_s_intersection(seed: int) -> None:
+def test_clipped_lines_equal_the_intersection_of_shapely(seed: int) -> None:
     area, lines = ragged(seed), wandering(seed)
     pieces = lines_of(clipped(lines, area))
     expected = as_shapely(area).intersection(shapely.MultiLineString(lines))
@@ -70,7 +70,7 @@ def test_several_bundles_become_one() -> None:
     assert merge_pieces([]).starts.tolist() == NO_PIECES.starts.tolist()
 
 
-def test_nothing_is_left_of_nothing() -> None:
+def test_clipping_by_an_empty_polygon_leaves_nothing() -> None:
     assert len(clipped(wandering(1), Polygons()).ends) == 0
     assert len(clip_lines(np.zeros((0, 2)), np.zeros(0, np.int64), index_edges(Polygons.square((1.0, 1.0)))).ends) == 0
 

@@ -80,5 +80,5 @@ def test_depths_are_the_distances_to_the_boundary_and_negative_outside(points: l
     assert np.allclose(depths(np.array(points), index_edges(FRAME)), expected, atol=1e-9)
 
 
-def test_nothing_lies_inside_of_nothing() -> None:
+def test_no_point_is_inside_an_empty_polygon() -> None:
     assert depths(np.zeros((1, 2)), index_edges(Polygons()))[0] == -np.inf

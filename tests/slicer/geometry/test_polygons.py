@@ -100,7 +100,7 @@ def test_the_union_of_several_is_shapely_s(seed: int) -> None:
 
 @few
 @given(seeds, st.floats(0.05, 2.0))
-def test_an_offset_lies_between_round_ones_of_its_distance_and_of_the_longest_mitre(seed: int, distance_mm: float) -> None:
+def test_an_offset_is_between_round_offsets_of_its_distance_and_of_the_mitre_limit(seed: int, distance_mm: float) -> None:
     star = ragged(seed)
     area = as_shapely(star)
     wide, narrow = as_shapely(offset(star, distance_mm)), as_shapely(offset(star, -distance_mm))
@@ -120,7 +120,7 @@ def test_a_round_offset_is_shapely_s(seed: int, distance_mm: float) -> None:
 
 @few
 @given(seeds, st.floats(0.1, 1.5))
-def test_opening_takes_only_what_is_narrow_away_and_closing_only_adds_such(seed: int, radius_mm: float) -> None:
+def test_opening_removes_and_closing_adds_only_narrow_regions(seed: int, radius_mm: float) -> None:
     star = ragged(seed)
     area, opened, closed = (as_shapely(polygons) for polygons in (star, opening(star, radius_mm), closing(star, radius_mm)))
     assert area.buffer(1e-4).covers(opened)
@@ -131,7 +131,7 @@ def test_opening_takes_only_what_is_narrow_away_and_closing_only_adds_such(seed:
 
 @few
 @given(seeds, st.floats(0.0, 6.3), st.floats(-40.0, 40.0))
-def test_a_half_plane_is_what_lies_on_one_side_of_a_line(seed: int, turn: float, c: float) -> None:
+def test_a_half_plane_is_the_region_on_one_side_of_a_line(seed: int, turn: float, c: float) -> None:
     star, (a, b) = ragged(seed), (np.cos(turn), np.sin(turn))
     side = shapely.affinity.rotate(shapely.box(-c, -200.0, 200.0, 200.0), turn, origin=(0.0, 0.0), use_radians=True)
     assert differs_mm2(half_plane(star, a, b, c), as_shapely(star) & side) < 1e-4
@@ -154,7 +154,7 @@ def test_strips_are_segments_with_square_ends(points: list[tuple[float, float]],
 
 @few
 @given(seeds, st.floats(0.2, 5.0))
-def test_a_sampled_loop_keeps_its_corners_and_has_no_longer_edge_than_asked(seed: int, step_mm: float) -> None:
+def test_a_sampled_loop_keeps_its_corners_and_has_bounded_edges(seed: int, step_mm: float) -> None:
     for loop in contours(ragged(seed)):
         sampled, _, _ = resample(loop, np.array([0, len(loop)]), step_mm)
         assert np.hypot(*np.diff(close_loop(sampled), axis=0).T).max() <= step_mm + 1e-9
@@ -179,12 +179,12 @@ def test_a_loop_is_the_same_from_any_of_its_points() -> None:
     assert area_mm2(start_at(loop, 1)) == area_mm2(loop) == 3.0
 
 
-def test_nothing_has_no_pieces_contours_or_edges() -> None:
+def test_an_empty_polygon_has_no_pieces_contours_or_edges() -> None:
     assert (islands(Polygons()), contours(Polygons()), edges(Polygons()).shape) == ([], [], (0, 4))
     assert union([]).is_empty()
 
 
-def test_no_module_keeps_polygons_of_which_manifold3d_would_complain_when_the_program_ends() -> None:
+def test_no_module_keeps_polygons_that_manifold3d_would_report_as_leaked() -> None:
     names = [name for name in modules() if name.startswith(("mdp.", "slicer.", "machine.planning")) and "learning" not in name]
     held = [value for name in names for value in vars(import_module(name)).values()]
     held += [field.default for kind in held if is_dataclass(kind) for field in fields(kind)]
@@ -192,13 +192,13 @@ def test_no_module_keeps_polygons_of_which_manifold3d_would_complain_when_the_pr
     assert [value for value in held if isinstance(value, CrossSection | Manifold)] == []
 
 
-def test_a_strip_reaches_as_far_as_each_of_its_segments_tells() -> None:
+def test_a_strip_is_as_wide_as_each_of_its_segments() -> None:
     line = np.array([[0.0, 0.0], [4.0, 0.0], [10.0, 0.0]])
     narrow, wide = shapely.box(-0.5, -0.5, 4.5, 0.5), shapely.box(3.0, -1.0, 11.0, 1.0)
     assert differs_mm2(strips([line], np.array([0.5, 1.0])), narrow | wide) < 1e-9
 
 
-def test_a_speck_whose_area_is_rounding_leaves_nothing_when_it_is_moved_inward() -> None:
+def test_a_degenerate_speck_vanishes_when_offset_inward() -> None:
     x = np.array([-8.572013482451439, -8.5720134973526, -8.652947783470154, -8.814816400408745])  # the result of a boolean
     y = np.array([-16.172413803637028, -16.172413803637028, -16.179024517536163, -16.192245960235596])
     assert offset(Polygons([np.column_stack([x, y])]), -0.136).is_empty()

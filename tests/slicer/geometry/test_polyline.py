@@ -25,7 +25,7 @@ def test_a_quarter_turn_of_half_a_line_has_as_few_chords_as_the_tolerance_allows
 
 @settings(max_examples=100, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)), min_size=3, max_size=30, unique=True))
-def test_no_point_that_is_left_out_lies_farther_off_than_the_tolerance(corners: list[tuple[float, float]]) -> None:
+def test_no_removed_point_is_farther_off_than_the_tolerance(corners: list[tuple[float, float]]) -> None:
     points = np.array(corners)
     line = shapely.LineString(kept(points))
     assert [line.coords[0], line.coords[-1]] == [corners[0], corners[-1]]
@@ -37,7 +37,7 @@ def lengthened(points: Floats, shortest_mm: float, most_mm: float) -> Floats:
     return moved[left]
 
 
-def test_a_short_step_round_a_corner_is_lengthened_along_the_longer_step_beside_it() -> None:
+def test_a_short_step_at_a_corner_is_lengthened_along_the_longer_neighbour() -> None:
     bevelled = np.array([[0.0, 0.0], [5.0, 0.0], [5.1, 0.1], [5.1, 5.0]])
     points = lengthened(bevelled, 0.25, 0.1)
     back_mm = np.sqrt(0.25**2 - 0.1**2) - 0.1  # its corner moves back until the step is the hypotenuse of 0.1 and 0.1 + back
@@ -55,7 +55,7 @@ def test_a_short_step_stays_where_its_line_would_move_too_far() -> None:
 
 @settings(max_examples=200, deadline=None)
 @given(st.lists(st.tuples(st.floats(0.0, 1.0), st.floats(0.0, 1.0)), min_size=2, max_size=30, unique=True))
-def test_lengthened_steps_leave_the_line_where_it_was_and_make_none_shorter(corners: list[tuple[float, float]]) -> None:
+def test_lengthening_steps_keeps_the_line_and_shortens_no_other(corners: list[tuple[float, float]]) -> None:
     points = np.array(corners)
     line = lengthened(points, 0.2, 0.1)
     before, after = (np.hypot(*np.diff(way, axis=0).T) for way in (points, line))

@@ -51,7 +51,7 @@ def test_orientation_is_twice_the_signed_area(a: tuple[float, float], b: tuple[f
 
 
 @given(places, places, places, places)
-def test_segments_cross_where_their_ends_lie_on_both_sides_of_each_other_a_point_on_a_line_to_its_right(
+def test_segments_cross_if_the_ends_of_each_are_on_both_sides_of_the_other(
     a: tuple[float, float], b: tuple[float, float], p: tuple[float, float], q: tuple[float, float]
 ) -> None:
     assume(a != b and p != q)

@@ -65,7 +65,7 @@ def test_a_point_and_a_plane_are_the_same_in_either_frame(first: Vector, second:
 
 
 @given(directions, st.integers(0, 99), st.floats(-6.0, 2.0), st.floats(0.5, 8.0))
-def test_a_band_is_what_lies_between_two_heights_over_the_plane(
+def test_a_band_is_the_region_between_two_heights_above_the_plane(
     direction: Vector, layer: int, low_mm: float, wide_mm: float
 ) -> None:
     earlier, later = part(1, UP, (0.0, 0.0, 0.0)), part(2, direction, (0.0, 0.0, 10.0))
@@ -78,7 +78,7 @@ def test_a_band_is_what_lies_between_two_heights_over_the_plane(
 
 
 @pytest.mark.parametrize(("direction", "layer"), [(UP, 49), ((0.4, 0.1, 0.9), 49), ((-0.8, 0.5, 0.3), 30), ((0.0, 1.0, 0.2), 70)])
-def test_what_is_carried_onto_the_plane_comes_back_and_stays_where_the_layer_meets_it(direction: Vector, layer: int) -> None:
+def test_projection_onto_the_plane_is_invertible_and_fixes_the_intersection_with_the_layer(direction: Vector, layer: int) -> None:
     plane = plane_of(part(1, UP, (0.0, 0.0, 0.0)), part(2, direction, (0.0, 0.0, 10.0)))
     area = Polygons.square((3.0, 2.0), True).rotate(20.0).translate((4.0, -3.0))
     there_and_back = as_shapely(plane.shadow(plane.project(area, layer), layer))

@@ -96,7 +96,7 @@ def test_all_of_a_layer_is_covered_by_beads_but_for_the_infill(shape: str, norma
 
 
 @pytest.mark.parametrize(("shape", "normal"), CASES)
-def test_a_later_part_s_first_layer_lies_on_solid_plastic(shape: str, normal: tuple[float, ...]) -> None:
+def test_the_first_layer_of_a_later_part_is_on_solid_plastic(shape: str, normal: tuple[float, ...]) -> None:
     (lower, upper), (under, over) = parts(shape, normal), shells(shape, normal)
     first = offset(over.sections.own[0], -0.1)
     x0, y0, x1, y1 = first.bounds()
@@ -124,7 +124,7 @@ def test_inner_walls_end_on_the_one_along_the_face_of_a_cut() -> None:
         assert np.allclose(upper.base.heights_mm(ends), -0.45, atol=0.4), "both ends lie beside the cut"
 
 
-def test_with_as_many_walls_on_a_cut_as_outside_all_run_round() -> None:
+def test_with_equal_walls_on_a_cut_and_outside_all_are_closed() -> None:
     lower, upper = parts("cube", STEEP)
     settings = profile(*PLAIN, "process.interface_walls=3")
     assert len(of_kind(slice_part(lower, settings, (), [upper]), Kind.INNER_WALL)) > 0

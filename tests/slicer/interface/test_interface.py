@@ -82,7 +82,7 @@ def test_parts_touch_that_come_as_near_as_that() -> None:
     assert near_parts(middle, [low, high], 0.5) == [low, high]
 
 
-def test_beneath_a_part_lies_what_earlier_ones_have_at_its_base_and_under_the_first_one_nothing() -> None:
+def test_a_part_is_on_the_sections_of_earlier_ones_and_the_first_on_nothing() -> None:
     low, middle, _ = stacked()
     section = Polygons.square((3.0, 3.0))
     assert plastic_below(low, [], section) is None
@@ -123,7 +123,7 @@ def test_a_place_is_shared_out_to_the_least_of_linear_functions(seed: int, count
     assert sum(areas) == pytest.approx(ring.area())
 
 
-def test_a_limb_s_plane_shares_in_places_beside_the_limb_alone() -> None:
+def test_the_plane_of_a_limb_has_joints_only_beside_the_limb() -> None:
     square, left = Polygons.square((10.0, 10.0), True), Polygons.square((4.0, 10.0)).translate((-5.0, -5.0))
     functions = [np.array([0.0, 0.0, 0.0]), np.array([0.0, 0.0, -1.0])]
     assert nearest_areas(square, functions, [None, left]) == pytest.approx([60.0, 40.0])
@@ -177,7 +177,7 @@ def test_a_layer_on_plastic_begins_with_its_longest_line_inside_unless_it_has_su
 
 @settings(max_examples=20)
 @given(seeds)
-def test_the_skin_beside_an_edge_is_the_outer_wall_as_near_to_it_in_space(seed: int) -> None:
+def test_the_outer_wall_near_an_edge_in_space_is_part_of_its_skin(seed: int) -> None:
     random, process = np.random.default_rng(seed), profile().process
     square, z_mm = Polygons.square((20.0, 20.0)), 3.0
     edge = np.array([[0.0, *random.uniform((0, 0), (20, 6)), 0.0, *random.uniform((0, 0), (20, 6))]])
@@ -193,7 +193,7 @@ def test_the_skin_beside_an_edge_is_the_outer_wall_as_near_to_it_in_space(seed: 
     assert not skin.intersects(shapely.box(0.37, 0.37, 19.63, 19.63))
 
 
-def test_where_faces_are_upright_in_both_parts_the_outer_walls_at_a_joint_are_one() -> None:
+def test_outer_walls_at_a_joint_are_continuous_on_faces_upright_in_both_parts() -> None:
     lower, upper = cut(box(20, 20, 40), ((0.5, 0.0, 0.8), 15.0))  # the faces at y = -10 and 10 are parallel to both directions
     above, below = slice_part(upper, profile(), (lower,)), slice_part(lower, profile(), (), (upper,))
     for part, layers in ((upper, above.layers[:1]), (lower, below.layers[-40:-20])):

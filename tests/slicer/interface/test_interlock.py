@@ -28,7 +28,7 @@ def test_grooves_are_half_of_the_inside_and_keep_clear_of_the_walls() -> None:
     assert all(part.bounds[3] - part.bounds[1] <= 2 * WIDTH + 1e-4 for part in area.geoms)
 
 
-def test_what_one_part_leaves_out_the_next_one_fills_in() -> None:
+def test_grooves_of_one_part_are_filled_by_the_next() -> None:
     base, top = stacked()
     area = grooves(top, profile(DEEP).process).area()
     pairs = [(slice_part(base, p, later=[top]), slice_part(top, p, [base])) for p in (profile(*SOLID), profile(*SOLID, DEEP))]
@@ -46,7 +46,7 @@ def test_the_tip_stays_at_its_height_and_only_the_first_layer_is_richer() -> Non
     assert rich[1].volumes_mm3.sum() == pytest.approx(plain[1].volumes_mm3.sum())
 
 
-def test_grooves_of_a_leaning_part_lie_just_below_its_base_plane() -> None:
+def test_grooves_under_a_tilted_part_are_just_below_its_base_plane() -> None:
     base, arm = cut(branch(), ((np.sin(np.pi / 3), 0, 0.5), 14.0))
     cuts = np.arange(0.1, 40, 0.2)
     whole = [Polygons.square((80, 80), True)] * len(cuts)

@@ -171,7 +171,7 @@ def test_the_tip_circles_in_the_mouth_before_anything_else_and_never_below_the_l
     assert first.volumes_mm3[:25].sum() == pytest.approx(removed_mm3([base, top], *keys), rel=0.01)
 
 
-def test_a_part_too_slender_or_too_low_below_has_none() -> None:
+def test_a_part_too_slender_or_too_low_below_has_no_pins() -> None:
     assert len(plan_pins(cut(box(4.4, 30, 20), (UP, 10.0)), profile(*PINS))[2]) == 0
     assert len(plan_pins(cut(box(4.8, 30, 20), (UP, 10.0)), profile(*PINS))[2]) > 3
     assert len(plan_pins(cut(box(24, 24, 20), (UP, 4.0)), profile(*PINS))[2]) == 0

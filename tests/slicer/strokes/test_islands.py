@@ -35,7 +35,7 @@ def test_beads_share_an_island_where_shapely_finds_their_starts_in_the_same_outl
     assert islands.tolist() == around
 
 
-def test_pieces_of_support_are_islands_of_their_own_and_a_skirt_is_none() -> None:
+def test_pieces_of_support_are_islands_and_a_skirt_is_not() -> None:
     section, support = Polygons.square((10.0, 10.0)), Polygons.square((4.0, 4.0)) + Polygons.square((4.0, 4.0)).translate((20, 0))
     support = support.translate((-30.0, 0.0))
     beads = [
@@ -108,14 +108,14 @@ def test_every_outer_wall_comes_right_after_the_inner_wall_nearest_to_it(seed: i
 
 
 @pytest.mark.parametrize("first", [True, False])
-def test_support_comes_before_the_part_where_a_part_begins_and_else_where_the_way_is_short(first: bool) -> None:
+def test_support_is_printed_first_where_a_part_begins_else_by_the_shorter_travel(first: bool) -> None:
     section, support = Polygons.square((10.0, 10.0)), Polygons.square((10.0, 10.0)).translate((30.0, 0.0))
     beads = [line(5, 5), line(35, 5, OUTSIDE, Kind.SUPPORT)]
     placed = order_beads(beads, section, STRAIGHT, None if first else np.array([4.0, 5.0]), support)
     assert [row.kind for row in rows_of(placed)] == ([Kind.SUPPORT, Kind.INFILL] if first else [Kind.INFILL, Kind.SUPPORT])
 
 
-def test_a_travel_goes_round_the_outer_wall_beside_an_interface_or_retracts() -> None:
+def test_a_travel_avoids_the_outer_wall_beside_an_interface_or_retracts() -> None:
     notched = Polygons.square((20.0, 20.0)) - Polygons([np.array([(9.0, 0.0), (11.0, 0.0), (10.0, 9.7)])])
     since, to, near = np.array([[2.0, 10.0]]), np.array([[18.0, 10.0]]), np.array([[1.0, 10.0]])
     skin = notched - offset(notched, -0.36)

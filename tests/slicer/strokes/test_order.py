@@ -42,7 +42,7 @@ def test_an_island_is_finished_before_the_next_begins() -> None:
     assert [rank_of[width] for width in placed.width_mm.tolist()] == [-1, -1, 0, 0, 2, 2] * 2
 
 
-def test_an_island_in_a_hole_is_an_island_of_its_own() -> None:
+def test_an_island_in_a_hole_is_a_separate_island() -> None:
     section = Polygons.square((30, 30), True) - Polygons.square((20, 20), True) + Polygons.square((6, 6), True)
     beads = [line(-1, 0, 1, 0, 0), line(-13, -13, -13, 13, 0), line(-1, 1, 1, 1, 2), line(-12, -13, -12, 13, 2)]
     placed = order_beads(beads, section, STANDARD, np.array([-13.0, -13.0]))
@@ -121,7 +121,7 @@ def test_inner_walls_come_from_the_inside_out_then_the_outer_wall_then_the_fill(
     assert set(kinds[3:]) == {Kind.INFILL}
 
 
-def test_seams_of_a_tower_stand_over_each_other() -> None:
+def test_seams_of_a_tower_are_aligned() -> None:
     sliced = slice_part(whole(tee()), profile("process.support=none"))
     below_its_shade = sliced.layers[1:120]  # above the first layer, which is smaller, and below the arms, which hide seams better
     seams = [p.points[0] for layer in below_its_shade for p in layer.paths if p.kind is Kind.OUTER_WALL]

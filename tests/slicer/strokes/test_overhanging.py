@@ -120,6 +120,6 @@ def test_a_part_on_plastic_overhangs_where_its_base_reaches_beyond() -> None:
     assert Kind.OVERHANG not in {p.kind for p in second.paths}
 
 
-def test_nothing_overhangs_on_the_platform() -> None:
+def test_nothing_overhangs_on_the_build_plate() -> None:
     assert kinds(split(placed(square(10)), Polygons.square((12, 12)), None)) == [Kind.OUTER_WALL]
     assert len(NOWHERE) == 0

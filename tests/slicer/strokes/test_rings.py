@@ -23,7 +23,7 @@ def test_a_ring_begins_at_the_corner_nearest_to_the_tip() -> None:
     assert ring.tolist() == [[10, 10], [0, 10], [0, 0], [10, 0], [10, 10]]
 
 
-def test_a_line_there_and_back_far_from_the_tip_begins_beside_it_in_two_pieces() -> None:
+def test_a_double_line_is_split_to_begin_near_the_tip() -> None:
     ((_, pieces),) = in_order([THERE_AND_BACK], [OPEN], (0.0, 1.0))
     assert [piece.tolist() for piece in pieces] == [[[0, 0], [0, 2], [25, 2], [50, 2]], [[50, 0], [25, 0], [0, 0]]]
 

@@ -80,7 +80,7 @@ def test_nearest_is_the_point_of_the_wall_nearest_to_the_tip(tip: tuple[float, f
     assert seam_of(SQUARE, "nearest", tip=tip) == pytest.approx(expected)
 
 
-def test_aligned_goes_on_beside_the_seam_below_unless_a_corner_is_close() -> None:
+def test_an_aligned_seam_continues_the_seam_below_unless_a_corner_is_close() -> None:
     assert seam_of(SQUARE, "aligned", before=[(4, -0.1)]) == pytest.approx((4, 0))
     assert seam_of(SQUARE, "aligned", before=[(9.4, -0.1)]) == (10, 0)
     assert seam_of(SQUARE, "corner", before=[(6, -0.1)]) == (10, 0)
@@ -155,7 +155,7 @@ def distance_mm(seam: Floats, z: float, segments: Floats) -> float:
     return np.sqrt(((points - [*seam, z]) ** 2).sum(axis=2)).min()
 
 
-def test_no_seam_lies_on_the_edge_where_a_later_part_begins() -> None:
+def test_no_seam_is_on_the_edge_where_a_later_part_begins() -> None:
     mesh = standing(m3.Manifold.cylinder(20, 5, 5, 96))
     base, top = cut(mesh, ((0, np.sin(0.7), np.cos(0.7)), 7.0))
     edge = rim(5.0, 0.7, 7.0)
@@ -191,7 +191,7 @@ def test_first_layers_on_a_section_of_their_own_shape_begin_inside() -> None:
 @pytest.mark.parametrize(
     "loop", [[(0, 0), (0.4, 1.6), (-0.4, 1.6)], [(0, 0), (0.3, 0), (0.3, 4), (0, 4)], [(0, 0), (0.01, -0.1), (0.3, 2)]]
 )
-def test_walls_of_a_tip_near_an_interface_begin_inside_it_all_the_same(loop: list[tuple[float, float]]) -> None:
+def test_walls_of_a_tip_near_an_interface_begin_inside_it(loop: list[tuple[float, float]]) -> None:
     everywhere = [[-1, y, 0.1, 1, y, 0.1] for y in np.arange(-1, 5, 0.1)]
     (bead,), _ = place_seams([Bead(Kind.OUTER_WALL, np.array(loop), 0.45, 0)], process("rear"), around(interfaces=everywhere))
     assert shapely.Polygon(loop).buffer(1e-6).covers(shapely.LineString(bead.points))
@@ -205,11 +205,11 @@ def test_first_layers_on_a_wider_part_begin_beside_it_when_they_reach_beyond() -
     assert seam[0] > 1.0
 
 
-def test_rear_of_a_part_lies_behind_its_middle() -> None:
+def test_a_rear_seam_is_behind_the_middle_of_its_part() -> None:
     assert rear_of(box(10, 20, 5).bounds_mm) == pytest.approx([0, 30])
 
 
-def test_a_wall_that_begins_inside_does_so_where_there_is_room_not_in_a_sharp_corner() -> None:
+def test_a_wall_begins_inside_where_there_is_room_and_not_in_a_sharp_corner() -> None:
     wedge = np.array([[0.0, 0.0], [20.0, 0.0], [20.0, 3.0]])
     rim = np.hstack([np.insert(wedge, 2, 0.1, axis=1), np.insert(np.roll(wedge, -1, axis=0), 2, 0.1, axis=1)])
     beads, _ = place_seams(

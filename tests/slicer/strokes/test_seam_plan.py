@@ -30,7 +30,7 @@ def planned(part: Part, *others: Part) -> list[Floats]:
     return plan_seams(of, [seam_limits(NO_EDGES, NO_EDGES, z_mm, SETTINGS.process) for z_mm in of.heights.cut_mm])
 
 
-def test_the_seam_of_a_box_with_a_groove_lies_in_the_groove_s_corner() -> None:
+def test_the_seam_of_a_box_with_a_groove_is_in_the_corner_of_the_groove() -> None:
     places = np.concatenate(planned(whole(standing(GROOVED))))
     assert np.abs(np.abs(places) - [7, 2]).max() < 0.05
     assert np.abs(np.diff(places, axis=0)).max() < 0.05  # in one of the two corners
@@ -44,7 +44,7 @@ def test_a_box_without_a_groove_begins_at_a_corner_of_the_rear() -> None:
     assert np.abs(np.diff(places, axis=0)).max() < 0.01
 
 
-def test_the_seam_of_a_disc_lies_below_the_groove_at_the_front_of_what_stands_on_it() -> None:
+def test_the_seam_of_a_disc_is_below_the_groove_of_the_body_on_it() -> None:
     disc = m3.Manifold.cylinder(2, 11, 11, 90).translate((0, 0, -2))
     block = m3.Manifold.cube((16, 16, 8), True).translate((0, 0, 4))
     places = np.concatenate(planned(whole(standing(disc + block - m3.Manifold.cube((4, 6, 9), True).translate((0, -8, 4.5))))))
@@ -58,7 +58,7 @@ def beside_a_wall(*more: m3.Manifold) -> Part:
     return whole(standing(m3.Manifold.batch_boolean([m3.Manifold.cylinder(20, 8, 8, 90, True), wall, *more], m3.OpType.Add)))
 
 
-def test_the_seam_of_a_cylinder_lies_where_it_faces_a_wall_of_its_own_body() -> None:
+def test_the_seam_of_a_cylinder_is_where_it_faces_a_wall_of_its_own_body() -> None:
     plate = m3.Manifold.cube((20, 60, 2), True).translate((2, 0, -9))
     for of_layer in planned(beside_a_wall(plate))[15:]:
         (of_cylinder,) = of_layer[of_layer[:, 0] < 7.0]
@@ -95,7 +95,7 @@ def test_cubes_in_a_row_have_their_seams_in_their_corners() -> None:
         assert np.abs((of_layer[:, 0] + 18.0) % 13.0 - 5.0) == pytest.approx([5.0] * 3, abs=0.05)
 
 
-def test_seams_beside_a_joint_keep_clear_of_its_edge_and_lie_in_the_groove_that_both_parts_have() -> None:
+def test_seams_near_a_joint_avoid_its_edge_and_are_in_the_groove_of_both_parts() -> None:
     base, top = cut(standing(GROOVED), ((0, 0, 1), 8.0))
     (loop,) = contours(sections(top, base).outlines[1])
     rim = np.insert(np.hstack([loop, np.roll(loop, -1, axis=0)]), [2, 4], 8.0, axis=1)
@@ -111,7 +111,7 @@ def light(of: Sections, layer: int, asked: list[list[float]]) -> Floats:
     return light_at(layer, np.array(asked), of.heights.cut_mm, *light_samples(of, [contours(area) for area in of.outlines]))
 
 
-def test_another_part_keeps_the_light_from_a_wall_that_it_stands_before() -> None:
+def test_a_part_in_front_of_a_wall_occludes_it() -> None:
     post, shade = m3.Manifold.cube((10, 10, 30), True), m3.Manifold.cube((4, 60, 30), True).translate((9, 0, 0))
     joined = post + shade + m3.Manifold.cube((30, 60, 4), True).translate((3, 0, -17))
     base, top = cut(standing(joined), ((0, 0, 1), 20.0))

@@ -49,7 +49,7 @@ def test_the_fan_rises_evenly_to_its_full_layer() -> None:
     assert {layer.fan for layer in top.layers[3:]} == {1.0}
 
 
-def test_bridges_get_a_fan_of_their_own() -> None:
+def test_bridges_have_their_own_fan_speed() -> None:
     wall, roof = m3.Manifold.cube((5, 8, 6)), m3.Manifold.cube((20, 8, 4)).translate((0, 0, 6))
     arch = from_manifold(wall + wall.translate((15, 0, 0)) + roof)
     sliced = slice_part(whole(arch), profile("process.support=none", "material.fan_bridge=0.9", "material.fan_least=0.2"))

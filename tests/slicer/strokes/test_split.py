@@ -41,7 +41,7 @@ def length_mm(points: Floats) -> float:
 
 @settings(max_examples=40)
 @given(seeds)
-def test_as_much_of_a_line_is_marked_as_lies_within(seed: int) -> None:
+def test_the_part_of_a_line_inside_a_region_is_marked(seed: int) -> None:
     area, line = ragged(seed), walk(seed)
     pieces = parted(placed(line), area, 0.0)
     inside = sum(length_mm(piece.points) for piece in pieces if piece.kind is INSIDE)
@@ -52,7 +52,7 @@ def test_as_much_of_a_line_is_marked_as_lies_within(seed: int) -> None:
 
 @settings(max_examples=30)
 @given(seeds, st.floats(0.0, 8.0))
-def test_the_pieces_of_a_line_are_the_line_and_none_is_shorter_than_allowed(seed: int, shortest_mm: float) -> None:
+def test_the_pieces_of_a_line_add_up_to_it_and_none_is_too_short(seed: int, shortest_mm: float) -> None:
     line = walk(seed)
     pieces = parted(placed(line), ragged(seed), shortest_mm)
     ends = [(piece.points[0].tolist(), piece.points[-1].tolist()) for piece in pieces]
@@ -65,7 +65,7 @@ def test_the_pieces_of_a_line_are_the_line_and_none_is_shorter_than_allowed(seed
 
 
 @pytest.mark.parametrize(("reach_mm", "lengths_mm"), [(1.5, [20.0]), (2.5, [10.0, 2.5, 7.5])])
-def test_a_line_is_not_parted_for_less_than_asked_for_within(reach_mm: float, lengths_mm: list[float]) -> None:
+def test_a_line_is_not_split_for_a_shorter_piece_than_set(reach_mm: float, lengths_mm: list[float]) -> None:
     area, line = Polygons.square((reach_mm, 2.0)).translate((10.0, -1.0)), placed(np.array([[0.0, 0.0], [20.0, 0.0]]))
     pieces, _ = split(line, area, line.is_of(Kind.OUTER_WALL), 1.0, 2.0)
     assert [length_mm(piece.points) for piece in rows_of(pieces)] == pytest.approx(lengths_mm)
@@ -73,7 +73,7 @@ def test_a_line_is_not_parted_for_less_than_asked_for_within(reach_mm: float, le
 
 @settings(max_examples=40)
 @given(seeds)
-def test_every_step_of_a_cut_line_lies_within_or_without_as_its_middle_does(seed: int) -> None:
+def test_every_step_of_a_split_line_is_on_the_side_of_its_middle(seed: int) -> None:
     area = as_shapely(ragged(seed))
     points, within = cut_line(walk(seed), ragged(seed))
     middles = 0.5 * (points[1:] + points[:-1])

@@ -34,7 +34,7 @@ def test_a_detour_never_leaves_the_section_and_is_no_longer_than_allowed(seed: i
 
 @settings(max_examples=30)
 @given(st.integers(0, 10**6))
-def test_travels_leave_the_inside_where_shapely_says_so(seed: int) -> None:
+def test_travels_leave_the_inside_where_shapely_does(seed: int) -> None:
     section = ragged(seed)
     safe = as_shapely(offset(section, -SAFE * WIDTH))
     since, to = np.random.default_rng(seed).uniform(-20, 20, (2, 100, 2))
@@ -51,7 +51,7 @@ def _ways_mm(a: Floats, b: Floats, obstacle: shapely.Geometry) -> list[float]:
 
 @settings(max_examples=40)
 @given(st.integers(0, 10**6), st.integers(6, 12))
-def test_a_detour_past_a_convex_hole_is_the_shorter_way_round_pulled_taut(seed: int, corners: int) -> None:
+def test_a_detour_around_a_convex_hole_is_the_shortest_path(seed: int, corners: int) -> None:
     random = np.random.default_rng(seed)
     hole = Polygons.circle(6.0, corners).rotate(random.uniform(0, 360))
     plate, turn, spread = Polygons.square((60.0, 60.0), True) - hole, random.uniform(0, 2 * np.pi), random.uniform(-0.7, 0.7)
@@ -91,7 +91,7 @@ def test_there_is_no_detour_from_island_to_island() -> None:
     assert Combing(apart, WIDTH).detour(np.array([1.0, 1.0]), np.array([8.0, 1.0]), 1000.0) is None
 
 
-def test_a_travel_round_a_corner_goes_behind_the_outer_wall_instead_of_retracting() -> None:
+def test_a_travel_around_a_corner_stays_behind_the_outer_wall_instead_of_retracting() -> None:
     ell = Polygons.square((20, 20)) - Polygons.square((15, 15)).translate((5, 5))
     beads = [Bead(Kind.INFILL, np.array(line, dtype=float), WIDTH, 3) for line in ([[2, 12], [2, 18]], [[12, 2], [18, 2]])]
     combed = order_beads(beads, ell, profile().process, np.array([2.0, 11.0]))

@@ -117,7 +117,9 @@ def stepped(low_mm: float, high_mm: float) -> Mesh:
         ([whole(stepped(10, 6))], (), "at 4.20 mm the model steps in or out by more than a wall's width, 0.45 mm: 36 mm of wall"),
     ],
 )
-def test_what_is_no_vase_is_refused_with_the_reason(parts: list[Part], settings: tuple[str, ...], reason: str) -> None:
+def test_a_model_unsuitable_for_vase_mode_is_refused_with_the_reason(
+    parts: list[Part], settings: tuple[str, ...], reason: str
+) -> None:
     with pytest.raises(SliceError) as refused:
         slice_parts(parts, profile(*VASE, *settings))
     assert reason in str(refused.value)

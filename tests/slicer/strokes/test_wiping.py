@@ -17,7 +17,7 @@ UP_TO_THE_EDGE, BACK_OVER_THE_EDGE = [(10, 5), (10, 0.2)], [(10, 0.2), (10, 1.5)
 
 
 @pytest.mark.parametrize(("points", "wiped"), [(LED, False), (INNER, True), (UP_TO_THE_EDGE, True), (BACK_OVER_THE_EDGE, False)])
-def test_what_ends_inside_is_not_wiped_over_the_outer_wall(points: list[tuple[float, float]], wiped: bool) -> None:
+def test_a_stroke_that_ends_inside_is_not_wiped_over_the_outer_wall(points: list[tuple[float, float]], wiped: bool) -> None:
     bead = Bead(Kind.OUTER_WALL, np.array(points, dtype=float), 0.45, 0)
     strokes = strokes_of([bead], np.array([False]), {}, 0.0)
     assert may_wipe_over(strokes, SKIN, 2.0).tolist() == [wiped]

@@ -54,7 +54,7 @@ def test_a_trunk_has_every_place_within_its_radius_and_reaches_little_further(ra
 
 @settings(max_examples=40)
 @given(seeds, st.integers(0, 12))
-def test_of_trunks_in_one_place_one_stays(seed: int, count: int) -> None:
+def test_coincident_trunks_become_one(seed: int, count: int) -> None:
     areas = in_the_open(1e-9)
     thick_mm = trunk_radius_mm(areas.process, areas.radius_mm)
     rows = np.random.default_rng(seed).uniform((-2, -2), (2, 2), (count, 2)).tolist()
@@ -64,7 +64,7 @@ def test_of_trunks_in_one_place_one_stays(seed: int, count: int) -> None:
 
 @settings(max_examples=40)
 @given(seeds, st.integers(0, 9), st.floats(0.0, 20.0))
-def test_trunks_go_half_way_to_the_nearest_one_that_they_can_meet_in_time(seed: int, count: int, reach: float) -> None:
+def test_trunks_move_half_way_to_the_nearest_one_that_they_can_reach(seed: int, count: int, reach: float) -> None:
     at = np.random.default_rng(seed).uniform(-15.0, 15.0, (count, 2))
     expected = []
     for k, own in enumerate(at):
@@ -90,7 +90,7 @@ def test_a_tree_takes_up_all_of_a_contact_that_is_reachable_in_a_branch_for_ever
     assert len(squares) <= len(grown) <= len(islands(contact ^ reachable)) + 36
 
 
-def test_nothing_that_begins_changes_no_tree_and_no_branches_go_nowhere() -> None:
+def test_empty_layers_change_no_tree_and_no_branches_give_no_tree() -> None:
     tree = [trunk(3.0, -2.0, 1.0)]
     assert add_contact(tree, Polygons(), Polygons.square((9.0, 9.0))) == tree
     assert lower_branches([], in_the_open(1.0), 1) == []

@@ -63,17 +63,17 @@ def own_missed_mm2(name: str) -> float:
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_what_own_ground_does_not_hold_stands_on_support_of_the_parts_before(name: str) -> None:
+def test_support_without_its_own_base_continues_in_earlier_parts(name: str) -> None:
     assert sum(supports.unsupported_mm2 for supports in planned(name)) <= 0.02 * own_missed_mm2(name)
 
 
 @pytest.mark.parametrize("name", ["level", "tilted", "through two parts", "two directions"])
-def test_there_was_something_to_hand_down(name: str) -> None:
+def test_the_example_has_support_that_continues_in_earlier_parts(name: str) -> None:
     assert own_missed_mm2(name) > 50.0
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_no_support_stands_above_a_later_base_plane(name: str) -> None:
+def test_no_support_is_above_a_later_base_plane(name: str) -> None:
     for supports in planned(name):
         for later in supports.sections.later:
             turn, shift = frame_change(supports.sections.part, later)
@@ -106,7 +106,7 @@ def test_every_support_on_a_base_plane_has_plastic_of_an_earlier_part_or_its_sup
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_every_layer_of_support_stands_on_the_one_below(name: str) -> None:
+def test_every_layer_of_support_is_on_the_one_below(name: str) -> None:
     for supports in planned(name):
         sections = supports.sections
         lean_mm = sections.process.layer_height_mm + ROUNDING_MM
@@ -118,7 +118,7 @@ def test_every_layer_of_support_stands_on_the_one_below(name: str) -> None:
                 assert (as_shapely(supports.areas[m]) - shapely.union_all(ground)).buffer(-ROUNDING_MM).area < 0.02
 
 
-def test_support_of_the_first_part_goes_up_to_the_plane() -> None:
+def test_support_of_the_first_part_ends_at_the_plane() -> None:
     mesh, planes = CASES["tilted"]
     sliced = slice_parts(cut(mesh, *planes), profile())
     assert sum(piece.unsupported_mm2 for piece in sliced) < 1.0
@@ -130,7 +130,7 @@ def test_a_process_without_support_hands_nothing_down() -> None:
     assert [of_kind(piece, *PROPS) for piece in slice_parts(parts, profile("process.support=none"))] == [[], []]
 
 
-def test_a_place_that_gets_none_is_told_with_the_part_that_is_in_the_way() -> None:
+def test_an_overhang_without_support_is_reported_with_the_obstructing_part() -> None:
     part = cut(tee())[0]
     guest = from_manifold(m3.Manifold.cube((4, 4, 4)).translate((30, 0, 30)))
     base = Plane(unit((0.5, 0.0, 0.86)), float(unit((0.5, 0.0, 0.86)) @ (14.0, 0.0, 24.0)))

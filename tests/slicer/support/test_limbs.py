@@ -39,7 +39,7 @@ def support_points(piece: SlicedPart) -> np.ndarray:
     return np.concatenate([np.zeros((0, 3)), *points])
 
 
-def test_support_of_limbs_that_stand_goes_above_the_base_plane_of_one_that_is_printed_later() -> None:
+def test_support_of_earlier_limbs_extends_above_the_base_plane_of_a_later_one() -> None:
     decomposition = bars()
     first, last = slice_parts(decomposition.parts, load(settings=["process.infill_density=0.1"]))
     standing, own = support_points(first), support_points(last)
@@ -72,7 +72,7 @@ def test_a_plane_without_a_limb_still_blocks_all_that_is_above_it() -> None:
     assert high.area() == pytest.approx(200.0**2)
 
 
-def test_where_the_head_prints_a_limb_begins_under_its_shadow_and_widens_with_the_head() -> None:
+def test_the_swept_volume_of_the_head_over_a_limb_widens_with_the_head() -> None:
     _, last = bars().parts
     assert shadow_of(last).bounds() == pytest.approx((32.0, -4.0, 48.0, 4.0))
     levels = head_room(last, MACHINE, 0.3)
@@ -93,7 +93,7 @@ def tower_beside_a_bar() -> Decomposition:
     return decomposed(mesh, load(), limb(mesh, [(-24.0, -4.0, 26.0)], (0.0, 0.0, 10.0)))
 
 
-def test_support_of_a_limb_stands_only_where_the_head_passes_what_stands_beside_it() -> None:
+def test_support_of_a_limb_is_only_where_the_head_passes_its_neighbours() -> None:
     decomposition = tower_beside_a_bar()
     _, last = slice_parts(decomposition.parts, load(settings=["process.infill_density=0.1"]))
     points = support_points(last)
@@ -104,7 +104,7 @@ def test_support_of_a_limb_stands_only_where_the_head_passes_what_stands_beside_
     assert (10.0 + points[:, 2] + under >= 40.0).all()
 
 
-def test_what_stands_beside_a_limb_has_its_sides_compensated_above_the_limb_s_base_plane() -> None:
+def test_neighbours_of_a_limb_are_compensated_above_its_base_plane() -> None:
     first, last = bars().parts
     sections = section_part(first, load(settings=["process.outline_compensation_mm=0.2"]), (), (last,))
     layer = int(np.searchsorted(sections.heights.cut_mm, 15.0))

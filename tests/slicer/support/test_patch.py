@@ -33,7 +33,7 @@ def test_no_support_begins_in_layers_that_the_earlier_part_has_no_use_for() -> N
     assert max(Patch(Polygons.square((4.0, 2.0), True), GAP_MM).begins(plane(LEVEL), 47)) == 46
 
 
-def test_under_a_tilted_place_every_layer_takes_the_strip_that_lies_below_it() -> None:
+def test_every_layer_under_a_tilted_overhang_has_the_strip_below_it() -> None:
     tilted, hanging = plane(TILTED), Polygons.square((5.0, 5.0), True)
     begins = Patch(hanging, 0.0).begins(tilted, 100)
     covered = as_shapely(Polygons())

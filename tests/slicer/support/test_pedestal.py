@@ -33,14 +33,14 @@ def test_the_pedestal_is_all_support_and_the_model_has_none() -> None:
     assert not kinds(model) & PROPS
 
 
-def test_the_gap_lies_between_roof_and_model() -> None:
+def test_the_gap_is_between_roof_and_model() -> None:
     pedestal, model = lifted(box(), "process.pedestal_gap_mm=0.15")
     assert pedestal[-1].z_mm == pytest.approx(4.85)
     assert model[0].z_mm - model[0].height_mm == pytest.approx(5.0)
     assert model[-1].z_mm == pytest.approx(25.0)
 
 
-def test_the_model_is_printed_as_on_the_platform() -> None:
+def test_the_model_is_printed_as_on_the_build_plate() -> None:
     _, model = lifted(box())
     alone = slice_part(whole(box()), profile("process.skirt_loops=0", "process.elephant_foot_mm=0")).layers
     assert [lay.height_mm for lay in model] == pytest.approx([lay.height_mm for lay in alone])
@@ -71,7 +71,7 @@ def test_a_ball_is_held_by_what_is_sunk_of_it() -> None:
     assert pedestal[-1].z_mm == pytest.approx(4.9)
 
 
-def test_support_beside_the_pedestal_still_stands_on_the_platform() -> None:
+def test_support_beside_the_pedestal_is_on_the_build_plate() -> None:
     mushroom = m3.Manifold.cube((8, 8, 12), True) + m3.Manifold.cube((30, 30, 3), True).translate((0, 0, 7))
     pedestal, model = lifted(standing(mushroom))
     far = [np.abs(p.points).max() for lay in pedestal for p in lay.paths if p.kind is Kind.SUPPORT]

@@ -52,14 +52,14 @@ def test_a_place_without_support_has_the_reason_that_its_part_is_made_for(
     assert [area.mm2 for area in areas] == sorted((area.mm2 for area in areas), reverse=True)
 
 
-def test_an_arm_farther_out_than_support_may_lean_from_its_part_s_own_foot() -> None:
+def test_an_arm_beyond_the_lean_of_support_has_that_as_the_reason() -> None:
     gallows = BLOCK((16, 8, 10)) + BLOCK((8, 8, 18)) + BLOCK((26, 8, 4)).translate((0, 0, 18))
     base, top = cut(standing(gallows), ((0, 0, 1), 10.0))
     (arm,) = slice_part(top, profile("process.support_branch_angle_deg=30"), [base]).unsupported
     assert arm.reason == "support would have to lean by more than 30 deg to find ground"
 
 
-def test_a_slope_whose_lines_lie_beside_those_below_is_not_bare_but_a_shelf_over_it_is() -> None:
+def test_a_slope_is_not_bare_but_a_shelf_over_it_is() -> None:
     rise, lean, shelf = 10.0, 1.3, 6.0  # a layer reaches 0.26 mm beyond the one below: past 45 degrees, but less than a line
     tip = np.array([(x, y, z) for x, y in ((0, 0), (0, 8)) for z in (0, rise)] + [(lean * rise, y, rise) for y in (0, 8)])
     over = BLOCK((8 + shelf, 8, 2)).translate((-8 + lean * rise, 0, rise))

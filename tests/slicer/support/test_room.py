@@ -45,7 +45,7 @@ def test_support_keeps_its_gaps_to_the_layers_above_and_below(layer: int) -> Non
 
 @settings(max_examples=25)
 @given(st.integers(1, 999), st.integers(1, 999), st.floats(-5.0, 25.0), st.floats(0.0, 1.0), st.booleans())
-def test_where_a_later_part_s_base_plane_is_too_near_a_layer_is_blocked(
+def test_a_layer_is_blocked_near_the_base_plane_of_a_later_part(
     height: int, around: int, offset: float, gap: float, downward: bool
 ) -> None:
     part, tips = whole(box()), np.arange(1, 21) * 1.0
@@ -66,7 +66,7 @@ def test_without_later_parts_nothing_is_blocked() -> None:
 
 @settings(max_examples=15)
 @given(st.integers(0, 10**6), st.floats(0.2, 0.6), st.sampled_from(("lines", "grid")))
-def test_support_has_the_density_asked_for_inside_its_walls(seed: int, density: float, pattern: str) -> None:
+def test_support_has_the_set_density_inside_its_walls(seed: int, density: float, pattern: str) -> None:
     process = profile(
         f"process.support_density={density}", f"process.support_pattern={pattern}", "process.support_walls=0"
     ).process
@@ -77,7 +77,7 @@ def test_support_has_the_density_asked_for_inside_its_walls(seed: int, density: 
     assert {bead.kind for bead in beads} == {Kind.SUPPORT}
 
 
-def test_every_bead_of_support_lies_in_its_place_and_the_dense_ones_in_theirs() -> None:
+def test_every_bead_of_support_is_in_its_region() -> None:
     process, area = profile("process.support_walls=1").process, ragged(5)
     dense = area ^ Polygons.square((30.0, 60.0)).translate((0.0, -30.0))
     beads = support_beads(area, dense, Polygons(), process, 0.2, False)

@@ -77,7 +77,7 @@ def test_no_piece_of_support_is_a_needle_over_more_than_a_millimetre_or_slender_
 
 
 @pytest.mark.parametrize("height_mm", [30.0, 50.0])
-def test_a_trunk_that_stands_alone_has_its_diameter_at_every_height(height_mm: float) -> None:
+def test_a_free_trunk_has_its_diameter_at_every_height(height_mm: float) -> None:
     overhangs, supports = supported(whole(gallows(4.0, height_mm)))
     assert_sound(overhangs, supports)
     assert supports.unsupported_mm2 == 0.0
@@ -106,7 +106,7 @@ def test_the_least_diameter_follows_the_angle_the_trunk_and_the_height(above_mm:
 
 
 @pytest.mark.parametrize("wall_mm", [0.5, 1.2])
-def test_where_the_part_is_near_a_trunk_is_thinner_but_nothing_loses_its_support(wall_mm: float) -> None:
+def test_a_trunk_near_the_part_is_thinner_but_supports_the_same(wall_mm: float) -> None:
     mesh = gallows(10.0, 40.0, wall_mm)
     for trunk_mm in (2, 12):
         overhangs, supports = supported(whole(mesh), f"process.support_trunk_mm={trunk_mm}")
@@ -145,7 +145,7 @@ def test_a_long_ridge_as_narrow_is_filled_down_to_the_ground() -> None:
     assert [area.is_empty() for area in hollow] == [True, True, True, False]
 
 
-def test_lines_of_long_narrow_support_lie_on_lines_and_not_in_the_air() -> None:
+def test_lines_of_long_narrow_support_are_on_lines_and_not_in_the_air() -> None:
     wall, plate = m3.Manifold.cube((60, 2, 6), True), m3.Manifold.cube((60, 8.4, 1), True)
     part, settings = whole(standing(wall + plate.translate((0, 0, 3.5)))), profile("process.support_style=grid")
     decomposition = Decomposition("ledges", part.mesh, (part,), 1, "classic", 0.0, 0.0, 0, 0, 0.0)

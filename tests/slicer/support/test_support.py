@@ -64,7 +64,7 @@ def gallows(arm: float = 16.0, height: float = 20.0) -> m3.Manifold:
     return m3.Manifold.cube((8, 8, height)) + m3.Manifold.cube((8 + arm, 8, 4)).translate((0, 0, height))
 
 
-def test_both_arms_of_a_tee_are_supported_from_the_platform_up_to_the_gap() -> None:
+def test_both_arms_of_a_tee_are_supported_from_the_build_plate_up_to_the_gap() -> None:
     sliced = slice_part(whole(tee()), profile())
     held = layers_with_support(sliced)
     assert held[0].z_mm == pytest.approx(0.2)
@@ -84,7 +84,7 @@ def test_support_keeps_its_distance_from_the_part(gap: float, style: str) -> Non
     assert gap - 0.02 < away < gap + 0.15
 
 
-def test_columns_are_as_dense_as_asked() -> None:
+def test_columns_have_the_density_that_is_set() -> None:
     sliced = slice_part(whole(tee()), profile("process.support_density=0.2", "process.infill_angle_deg=90", *COLUMNS))
     across = lines_right_of_the_stem(sliced.layers[50], Kind.SUPPORT)
     assert np.diff(across) == pytest.approx(SPACING / 0.2)
@@ -137,7 +137,7 @@ def test_a_rim_that_gets_thick_enough_for_a_line_in_mid_air_hangs_there() -> Non
     assert find_overhangs(sections)[first].hanging.area() == pytest.approx(ring.area(), rel=0.01)
 
 
-def test_none_means_none() -> None:
+def test_support_none_prints_no_support() -> None:
     assert of_kind(slice_part(whole(tee()), profile("process.support=none")), *PROPS) == []
 
 
@@ -187,14 +187,14 @@ def test_support_on_the_part_itself_leaves_the_gaps_below_and_above_it(bottom: f
     assert held[-1].z_mm == pytest.approx(17.0 - top)
 
 
-def test_support_that_may_not_stand_on_the_part_leans_out_to_the_platform() -> None:
+def test_support_from_the_build_plate_only_leans_out_to_it() -> None:
     hook = m3.Manifold.cube((14, 8, 3)) + m3.Manifold.cube((5, 8, 30)) + m3.Manifold.cube((14, 8, 3)).translate((0, 0, 27))
     sliced = slice_part(whole(standing(hook)), profile("process.support_on_part=false"))
     assert layers_with_support(sliced)[0].z_mm == pytest.approx(0.2)
     assert sliced.unsupported_mm2 == 0.0
 
 
-def test_a_hanging_face_that_no_support_fits_under_is_told_unless_the_plastic_below_is_as_near() -> None:
+def test_an_overhang_without_room_for_support_is_reported_unless_plastic_is_close_below() -> None:
     slit = m3.Manifold.cube((30, 30, 10)) - m3.Manifold.cube((20, 20, 0.2)).translate((5, 5, 5))
     assert slice_part(whole(standing(slit)), profile("process.bridge_longest_mm=1")).unsupported_mm2 == 0.0
     drawer = m3.Manifold.cube((30, 30, 10)) - m3.Manifold.cube((20, 20, 0.7)).translate((5, 5, 5))
@@ -220,7 +220,7 @@ def test_support_of_a_later_part_roots_on_earlier_plastic() -> None:
     assert layers_with_support(sliced)[0].z_mm < 0.6
 
 
-def test_support_leans_over_the_edge_of_what_it_stands_on() -> None:
+def test_support_leans_over_the_edge_of_its_base() -> None:
     foot = m3.Manifold.cube((16, 8, 10)) + gallows(18.0, 34.0)
     base, top = cut(standing(foot), ((0, 0, 1), 10.0))
     sliced = slice_part(top, profile(), [base])
@@ -231,7 +231,7 @@ def test_support_leans_over_the_edge_of_what_it_stands_on() -> None:
     assert max(low) < edge + 1.0
 
 
-def test_what_the_lean_does_not_reach_is_told() -> None:
+def test_overhangs_beyond_the_lean_are_reported() -> None:
     foot = m3.Manifold.cube((16, 8, 10)) + gallows(18.0, 18.0)
     base, top = cut(standing(foot), ((0, 0, 1), 10.0))
     sliced = slice_part(top, profile("process.support_branch_angle_deg=30"), [base])
@@ -264,7 +264,7 @@ def test_support_of_a_leaning_arm_never_touches_the_part() -> None:
             assert distances_mm(section, np.concatenate(points)).max() < -(DISTANCE + 0.2)
 
 
-def test_support_gets_a_foot_on_the_platform() -> None:
+def test_support_gets_a_foot_on_the_build_plate() -> None:
     wide, narrow = (
         slice_part(whole(tee(height=16)), profile(f"process.support_foot_mm={mm}", "process.skirt_loops=0")).layers[0]
         for mm in (3, 0)
@@ -294,7 +294,7 @@ def test_support_beside_a_slope_reaches_half_a_line_under_it() -> None:
 
 
 @pytest.mark.parametrize("style", ["tree", "grid"])
-def test_the_foot_carries_whatever_stands_on_it(style: str) -> None:
+def test_the_foot_covers_all_support_on_it(style: str) -> None:
     foot, above = (
         [path for path in layer.paths if path.kind in PROPS]
         for layer in slice_part(whole(mushroom()), profile(f"process.support_style={style}")).layers[:2]
@@ -319,12 +319,12 @@ SOLIDS: dict[str, Callable[[], Mesh]] = {
 
 @pytest.mark.parametrize("style", ["tree", "grid"])
 @pytest.mark.parametrize("name", SOLIDS)
-def test_every_hanging_place_is_held_or_told_and_every_support_stands(name: str, style: str) -> None:
+def test_every_overhang_is_supported_or_reported_and_every_support_has_a_base(name: str, style: str) -> None:
     assert_sound(*supported(whole(SOLIDS[name]()), f"process.support_style={style}"))
 
 
 @pytest.mark.parametrize("style", ["tree", "grid"])
-def test_so_it_is_on_a_tilted_base_with_air_beside_it(style: str) -> None:
+def test_every_overhang_on_a_tilted_base_is_supported_or_reported(style: str) -> None:
     mesh = standing(gallows(20.0, 26.0))
     base, top = cut(mesh, ((0.3, 0.0, 1.0), 9.0))
     assert_sound(*supported(top, f"process.support_style={style}", earlier=[base]))
@@ -339,7 +339,9 @@ def test_so_it_is_on_a_tilted_base_with_air_beside_it(style: str) -> None:
     ),
     style=st.sampled_from(["tree", "grid"]),
 )
-def test_so_it_is_for_any_heap_of_boxes(boxes: list[tuple[int, int, int, int, int, int]], style: str) -> None:
+def test_every_overhang_of_any_heap_of_boxes_is_supported_or_reported(
+    boxes: list[tuple[int, int, int, int, int, int]], style: str
+) -> None:
     heap = m3.Manifold.cube((6, 6, 20), False).translate((-3, -3, 0))
     for x, y, z, a, b, c in boxes:
         heap += m3.Manifold.cube((a, b, c), True).translate((x, y, z + c / 2))

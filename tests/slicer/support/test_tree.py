@@ -26,13 +26,13 @@ def bored_bracket(seed: int, holes: int = 12) -> Mesh:
 
 
 @pytest.mark.parametrize("seed", [4, 8])
-def test_branches_between_holes_and_walls_stand_and_hold(seed: int) -> None:
+def test_branches_between_holes_and_walls_have_bases_and_support(seed: int) -> None:
     base, top = cut(bored_bracket(seed), ((0.5, 0.2, 1.0), 8.0))
     assert_sound(*supported(top, "process.layer_height_mm=0.3", earlier=[base]))
 
 
 @pytest.mark.parametrize("seed", range(6))
-def test_what_a_slope_pushes_aside_is_carried_wherever_that_can_be_and_keeps_few_corners(seed: int) -> None:
+def test_branches_deflected_by_a_slope_are_supported_and_stay_simple(seed: int) -> None:
     star = ragged(seed)
     places = offset(star, 1.0) - star
     for layer in range(1, 25):

@@ -59,7 +59,7 @@ def test_a_tall_part_on_a_small_base_gets_a_brim_and_a_stout_one_its_skirt() -> 
     assert min(np.abs(p.points).max() for p in stout) > 13
 
 
-def test_the_brim_of_a_small_base_goes_round_it_and_not_round_its_support() -> None:
+def test_the_brim_of_a_small_base_surrounds_it_and_not_its_support() -> None:
     sliced, base = slice_part(whole(tee(4, 40, 40)), profile("process.elephant_foot_mm=0")), shapely.box(-2, -2, 2, 2)
     away = [shapely.distance(base, shapely.points(path.points)) for path in of_kind(sliced, Kind.SKIRT)]
     assert max(np.abs(path.points).max() for path in sliced.layers[0].paths if path.kind is Kind.SUPPORT) > 6.5
@@ -71,7 +71,7 @@ def test_no_brim_where_it_is_not_wanted() -> None:
     assert brim_of(box(6, 6, 40), *BARE, "process.small_base_brim_mm=0") == []
 
 
-def test_what_is_printed_later_on_top_counts_as_height() -> None:
+def test_later_parts_on_top_count_as_height() -> None:
     base, top = cut(box(8, 8, 60), ((0, 0, 1), 5.0))
     alone, both = (of_kind(slice_part(base, profile(), later=later), Kind.SKIRT) for later in ((), (top,)))
     assert (len(alone), len(both)) == (1, 13)
@@ -94,7 +94,7 @@ def test_a_skirt_that_finds_no_room_on_the_plate_follows_its_edge() -> None:
     assert all(as_shapely(Polygons.square((18, 18), True)).distance(shapely.LineString(p.points)) > 0.2 for p in skirt)
 
 
-def test_support_stands_on_the_plate_only_and_leans_over_its_edge() -> None:
+def test_support_is_on_the_plate_only_and_leans_over_its_edge() -> None:
     near, far = (slice_part(whole(tee()), profile(f"machine.table.radius_mm={radius}")) for radius in (100, 12))
     reach = [np.hypot(*np.vstack([p.points for p in s.layers[0].paths]).T).max() for s in (near, far)]
     assert reach[0] > 13 > 12 >= reach[1]

@@ -21,7 +21,7 @@ def off_mm(sliced: SlicedPart, layer: int, kind: Kind = Kind.OUTER_WALL) -> Floa
     return np.concatenate([np.abs(path.points).max(axis=1) for path in paths]) - SIDE
 
 
-def test_points_of_an_outer_wall_lie_up_to_the_thickness_to_both_sides_of_it() -> None:
+def test_points_of_a_fuzzy_wall_are_within_the_thickness_on_both_sides() -> None:
     sliced = slice_part(whole(box(20, 20, 4)), profile(*FUZZY))
     off = np.concatenate([off_mm(sliced, layer) for layer in range(1, 20)])
     assert off.max() == pytest.approx(0.3, abs=0.02)
@@ -39,7 +39,7 @@ def test_a_rough_wall_begins_and_ends_where_the_even_one_does() -> None:
         assert ends[1] == pytest.approx(ends[0], abs=1e-6)
 
 
-def test_points_of_a_rough_wall_are_as_far_apart_as_is_asked_for() -> None:
+def test_points_of_a_fuzzy_wall_have_the_distance_that_is_set() -> None:
     sliced = slice_part(whole(box(20, 20, 4)), profile(*FUZZY, "process.fuzzy_skin_point_distance_mm=2"))
     counts = [sum(len(p.points) for p in layer.paths if p.kind is Kind.OUTER_WALL) for layer in sliced.layers[1:]]
     assert np.mean(counts) == pytest.approx(4 * 2 * SIDE / 2, rel=0.1)

@@ -58,7 +58,7 @@ def test_a_slot_is_filled_from_side_to_side(thickness: float) -> None:
     assert covered(beads).intersection(middle).area > 0.99 * middle.area
 
 
-def test_what_is_narrower_than_the_least_gap_stays_empty() -> None:
+def test_a_gap_narrower_than_the_least_one_stays_empty() -> None:
     assert gaps([Polygons.square((20.0, 0.4 * LEAST_GAP * WIDTH))], WIDTH, HEIGHT) == []
     assert gaps([Polygons()], WIDTH, HEIGHT) == []
 
@@ -109,7 +109,7 @@ def test_beads_in_any_place_hold_no_more_than_it_and_keep_to_it(
     assert covered(beads).difference(as_shapely(area).buffer(wider)).area < 1e-6
 
 
-def test_gap_fill_shorter_than_asked_for_is_left_out() -> None:
+def test_gap_fill_shorter_than_the_setting_is_left_out() -> None:
     sections = section_part(whole(bowl()), profile(*SOLID))
     overhangs = find_overhangs(sections)
     shells = build_shells(own_supports(sections, overhangs), overhangs)

@@ -37,7 +37,7 @@ def test_only_the_last_layer_of_a_block_has_one_wall_round_its_top() -> None:
     assert volume_mm3(sliced, *Kind) == pytest.approx(20 * 20 * 2, rel=0.01)
 
 
-def test_a_step_has_one_wall_and_what_stands_on_it_has_all_walls_below() -> None:
+def test_a_step_has_one_wall_and_the_body_on_it_has_all_walls_below() -> None:
     """The inner walls under a block of 10 mm follow that block instead of the plate of 20 mm."""
     sliced = slice_part(whole(stepped(10)), profile(*SOLID, "process.only_one_wall_top=true"))
     assert inner_wall_mm(sliced, 3) == pytest.approx(two_inner_walls_mm(20), abs=0.5)

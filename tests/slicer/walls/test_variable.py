@@ -110,7 +110,7 @@ def test_a_thick_island_has_walls_of_one_width() -> None:
     assert sides == pytest.approx([20.0 - WIDTH - 2.0 * k * spacing for k in range(3)], abs=1e-6)
 
 
-def test_without_walls_a_place_too_narrow_for_a_fill_gets_one_bead_and_the_rest_stays_open() -> None:
+def test_without_walls_a_narrow_place_gets_one_bead_and_the_rest_stays_open() -> None:
     block = Polygons.square((10, 10)) + Polygons.square((8, 0.5)).translate((10, 5))
     walled = layer_walls(block, 0, PROCESS, HEIGHT, NOZZLE)
     (line,) = walled.varying
@@ -153,7 +153,7 @@ def test_a_pin_is_filled_by_rings_or_a_dash_inside_it(diameter: float) -> None:
 
 @settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(st.floats(-4, 4), st.floats(-4, 4)), min_size=4, max_size=9), st.floats(0.3, 2.0), st.floats(0.0, 1.5))
-def test_all_beads_of_any_polygon_lie_in_it_with_widths_a_nozzle_prints(points: Points, hole: float, aside: float) -> None:
+def test_all_beads_of_any_polygon_are_inside_it_with_printable_widths(points: Points, hole: float, aside: float) -> None:
     section = m3.CrossSection.hull_points(np.array(points)) - Polygons.circle(hole, 16).translate((aside, 0))
     walls = variable_walls([section], RULE)
     wider = [wall for wall in walls if wall.level > 0 or wall.closed or wall.course[:, 2].min() > RULE.least + 1e-9]
@@ -252,7 +252,7 @@ def test_two_corners_that_all_but_meet_throw_no_wall_out_of_a_plate(x: float, as
     assert (points.max(axis=0) <= (10.0, 5.0)).all()
 
 
-def test_a_wall_whose_points_fall_on_each_other_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_wall_with_coincident_points_is_left_out(monkeypatch: pytest.MonkeyPatch) -> None:
     def fallen(line: Wall, *_: object) -> Wall:
         return replace(line, course=line.course[[0, 0]])
 

@@ -29,14 +29,14 @@ def test_spacing_makes_the_bead_as_large_as_its_strip() -> None:
     assert spacing_mm(WIDTH, HEIGHT) * HEIGHT == pytest.approx(bead_area_mm2(WIDTH, HEIGHT))
 
 
-def test_three_walls_of_a_square_lie_at_half_a_width_and_then_a_spacing_apart() -> None:
+def test_three_walls_of_a_square_are_half_a_width_in_and_a_spacing_apart() -> None:
     walled = walls(rectangle(20, 20), 3, PROCESS, HEIGHT)
     boxes = [loops[0].min(axis=0)[0] for loops in walled.loops]
     assert boxes == pytest.approx([0.225, 0.225 + SPACING, 0.225 + 2 * SPACING], abs=1e-6)
     assert walled.inside.area() == pytest.approx((20 - 2 * (0.225 + 2.5 * SPACING)) ** 2, rel=1e-6)
 
 
-def test_a_hole_gets_walls_of_its_own_running_the_other_way() -> None:
+def test_a_hole_gets_its_own_walls_in_the_opposite_direction() -> None:
     walled = walls(rectangle(20, 20) - rectangle(6, 6).translate((7, 7)), 1, PROCESS, HEIGHT)
     across = sorted(np.ptp(loop[:, 0]) for loop in walled.loops[0])
     assert across == pytest.approx([6.45, 19.55], abs=1e-6)
@@ -66,7 +66,7 @@ def test_walls_stay_inside_any_polygon(points: Points) -> None:
 
 
 @pytest.mark.parametrize(("order", "first"), [("inner-first", Kind.INNER_WALL), ("outer-first", Kind.OUTER_WALL)])
-def test_walls_are_ranked_in_the_order_asked_for(order: str, first: Kind) -> None:
+def test_walls_are_printed_in_the_order_that_is_set(order: str, first: Kind) -> None:
     beads = wall_beads(walls(rectangle(20, 20), 3, PROCESS, HEIGHT), profile(f"process.wall_order={order}").process, HEIGHT)
     ranked = sorted(beads, key=lambda bead: bead.rank)
     assert ranked[0].kind is first
@@ -89,7 +89,7 @@ def test_five_thousand_holes_are_walled() -> None:
     assert len(walled.loops[0]) == 71**2 + 1
 
 
-def test_where_no_pair_of_walls_has_room_none_turns_round() -> None:
+def test_without_room_for_a_pair_of_walls_none_reverses() -> None:
     bar = rectangle(20, 1.5 * WIDTH).translate((9.0, 4.0))  # beside a block that is wide enough
     for loop in walls(rectangle(10, 10) + bar, 3, PROCESS, HEIGHT).loops[0]:
         assert loop[:, 0].max() < 10.0

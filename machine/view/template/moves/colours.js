@@ -9,6 +9,7 @@ const TYPES = [
   [/bridge/i, "#56b4e9"], [/ironing/i, "#ffb3a7"], [/top/i, "#d55e00"], [/solid|skin|bottom/i, "#b4592b"], [/gap/i, "#8c6bb1"], [/interface/i, "#009e73"],
   [/support/i, "#74c8a3"], [/skirt|brim/i, "#7f8b99"], [/infill|fill/i, "#cc79a7"], [/custom/i, "#5d6570"],
 ];
+export const TRAVELS = [["#4c7ec4", "travel"], ["#e07a20", "turn of the table"], ["#8c70be", "wipe"]];
 export const typeColour = (name) => (TYPES.find(([pattern]) => pattern.test(name)) || [0, PLAIN])[1];
 
 // From dark violet over blue and green to yellow: even in lightness, also for the colour-blind.

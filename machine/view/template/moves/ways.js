@@ -2,11 +2,12 @@
 
 import { cornersOn, programOf } from "../picture/gl.js";
 import { clamp, countUpTo, length, mix, sub } from "../picture/math.js";
-import { linesOf } from "../picture/shapes.js";
+import { linesOf, rgb } from "../picture/shapes.js";
+import { TRAVELS } from "./colours.js";
 import { KIND, placeAt, workpieceOf } from "./rows.js";
 
-const PLAIN_WAY = [76, 126, 196, 200];
-const WAYS = { [KIND.rotate]: [224, 122, 32, 235], [KIND.wipe]: [140, 112, 190, 200] };
+const [PLAIN_WAY, TURN, WIPE] = TRAVELS.map(([colour]) => [...rgb(colour), 220]);
+const WAYS = { [KIND.rotate]: TURN, [KIND.wipe]: WIPE };
 const TURN_STEP_DEG = 3;
 
 /** Drawing of travel paths for ranges of rows; turns of the table are arcs. */

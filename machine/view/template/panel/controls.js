@@ -1,7 +1,7 @@
 // Controls: colouring, visibility, the legend, and the theme.
 
 import { $, duration, keptIn, listen, made, numberIn, optionsOf, partsInWords, swatch, swatches, tabsOf, tell, toggle } from "../elements.js";
-import { RAMP, typeColour } from "../moves/colours.js";
+import { RAMP, TRAVELS, typeColour } from "../moves/colours.js";
 import { KIND } from "../moves/rows.js";
 import { mix } from "../picture/math.js";
 import { hex, sectionAsked } from "../picture/shapes.js";
@@ -12,7 +12,7 @@ export function controlsOf(print, scene, bells) {
   for (const name of Object.keys(scene.on)) {
     const box = $(`show-${name}`);
     box.checked = scene.on[name];
-    box.addEventListener("change", () => { scene.on[name] = box.checked; bells.ring("look"); });
+    box.addEventListener("change", () => { scene.on[name] = box.checked; bells.ring(name === "travels" ? "colours" : "look"); }); // the legend has their colours
   }
   const choices = { "colour-by": ["mode", "colours"], others: ["others", "look"], model: ["model", "look"], risky: ["risky", "model"] };
   for (const [id, [key, bell]] of Object.entries(choices)) {
@@ -52,11 +52,11 @@ function typeBoxes({ rows }, scene, bells) {
   });
 }
 
-export function showLegend({ rows, header }, { mode, tried }, legend) {
+export function showLegend({ rows, header }, { mode, tried, on }, legend) {
   const title = tried ? `as ${partsInWords(tried.parts)}` : $("colour-by").selectedOptions[0].text + (legend ? `, ${legend.unit}` : "");
   const parts = tried ? tried.colours.map((colour, k) => [colour, `${k + 1}`]) : header.parts.map(({ colour, index }) => [colour, index ? `${index}` : "the file"]);
   const entries = swatches(mode === "kind" && !tried ? kindEntries(rows) : parts);
-  $("legend").replaceChildren(made("b", { text: title }), ...(legend && !tried ? scaleOf(legend) : entries));
+  $("legend").replaceChildren(made("b", { text: title }), ...(legend && !tried ? scaleOf(legend) : entries), ...(on.travels ? swatches(TRAVELS) : []));
 }
 
 function scaleOf({ marks }) {

@@ -118,7 +118,7 @@ const PROGRESS = ["summary", "search-told", "slicing-told", "comparing-told"];
 function elapsedTime() {
   let task = "", start = 0;
   const show = () => {
-    const seconds = (performance.now() - start) / 1000, text = task && seconds >= MOMENT_S ? ` ${duration(seconds)}` : "";
+    const seconds = (performance.now() - start) / 1000, text = task && seconds >= MOMENT_S ? ` (${duration(seconds)})` : "";
     if (store.line === "open") for (const id of PROGRESS) $(id).dataset.elapsed = $(id).textContent && text;
   };
   onNew((state) => state.busy || ["search", "slicing", "comparing", "preparing"].find((name) => state[name]) || "", (now) => {

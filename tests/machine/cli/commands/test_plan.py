@@ -59,6 +59,16 @@ def test_a_plan_that_is_not_there_yet_is_written_and_then_used(folder: Path) -> 
     assert len(_values("three.json")["parts"]) == 3
 
 
+def test_a_search_that_may_find_fewer_parts_than_have_settings_says_so_before_it_begins(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    Path("box.stl").write_bytes(stl(shapes.box()))
+    assert main(["export", "box.stl", "-o", "no.gcode", "--part", "9:walls=4", *FAST]) == 1
+    said = capsys.readouterr().err
+    note = "box.stl: --part 9 is refused after the search if that finds fewer parts: --plan with the plan of an earlier search"
+    assert said.index(note) < said.index("--part 9: there is no part 9")
+
+
 def test_part_settings_are_kept_in_the_plan_and_change_the_output(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("box.stl").write_bytes(stl(shapes.box()))
     Path("box.toml").write_text("version = 1\n[[part]]\n[[part]]\nnormal = [0, 0, 1]\noffset_mm = 6\nprocess = {walls = 1}\n")

@@ -168,7 +168,7 @@ def test_a_host_is_the_same_in_capitals() -> None:
     assert read_credentials(parse_server_address("octoprint:octopi.LOCAL")) == ("one", None)
 
 
-def test_the_variable_goes_before_the_file_and_no_key_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_environment_variable_overrides_the_file_and_no_key_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:
     write_servers('[servers."octopi"]\nkey = "one"\n')
     monkeypatch.setenv(VARIABLE, "other")
     key, _ = read_credentials(parse_server_address("octoprint:octopi"))
@@ -220,7 +220,7 @@ SERVER = parse_server_address("moonraker:printer.local")
         (7, ""),
     ],
 )
-def test_a_picture_lies_with_its_server_or_nowhere(told: object, address: str) -> None:
+def test_a_camera_address_belongs_to_its_server(told: object, address: str) -> None:
     assert picture_address(told, SERVER) == address
 
 
@@ -244,7 +244,7 @@ def camera(kind: str, body: bytes) -> Iterator[str]:
             server.shutdown()
 
 
-def test_a_picture_is_fetched_and_what_is_none_is_refused() -> None:
+def test_a_camera_picture_is_fetched_and_other_content_refused() -> None:
     with camera("image/jpeg", b"jpeg") as address:
         assert fetch_picture(address) == (b"jpeg", "image/jpeg")
     with camera("text/html", b"<p>") as address, pytest.raises(ServerError, match="gives no picture: status 200, text/html"):

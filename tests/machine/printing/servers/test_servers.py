@@ -80,7 +80,7 @@ def test_a_file_is_handed_over_whole_with_its_progress(kind: str) -> None:
     assert counts == [*range(0, len(UPLOAD.content), 65536), len(UPLOAD.content)]
 
 
-def test_a_file_that_a_moonraker_has_not_scanned_yet_is_there_all_the_same() -> None:
+def test_a_file_that_moonraker_has_not_scanned_yet_exists() -> None:
     with stand_in("moonraker", scans=False) as (job, address), session_with(address) as server:
         job.files["copied.gcode"] = b""
         assert (server.has("copied.gcode"), server.has("other.gcode")) == (True, False)
@@ -94,7 +94,7 @@ def test_a_file_that_a_moonraker_has_not_scanned_yet_is_there_all_the_same() -> 
      "http://127.0.0.1:8080/?action=snapshot"),
     ("octoprint", "/api/settings", {"webcam": []}, ""), ("moonraker", "/server/webcams/list", [], ""), ("duet", "/none", {}, ""),
 ])  # fmt: skip
-def test_a_server_tells_of_its_camera_or_of_none(kind: str, path: str, value: object, picture: str) -> None:
+def test_a_server_reports_its_camera_or_none(kind: str, path: str, value: object, picture: str) -> None:
     with stand_in(kind) as (job, address), session_with(address) as server:
         server.greet()
         assert server.webcam() == ""
@@ -134,7 +134,7 @@ def test_a_print_is_paused_resumed_and_cancelled_by_the_server(kind: str) -> Non
     assert phases[:3] == [PrintState.PRINTING, PrintState.PAUSED, PrintState.PRINTING]
 
 
-def test_an_emergency_stop_that_comes_as_the_person_leaves_is_given() -> None:
+def test_an_emergency_stop_while_the_user_leaves_is_executed() -> None:
     control = Control()
     with printing("octoprint") as (job, server):
 
@@ -150,7 +150,7 @@ def test_an_emergency_stop_that_comes_as_the_person_leaves_is_given() -> None:
         assert job.commands == ["M112"]
 
 
-def test_a_stop_for_which_the_key_cannot_be_read_is_told_as_not_confirmed() -> None:
+def test_a_stop_without_a_readable_key_is_reported_as_not_confirmed() -> None:
     servers_file().parent.mkdir(parents=True)
     servers_file().write_text("key")
     servers_file().chmod(0o600)
@@ -180,7 +180,7 @@ def test_only_the_print_that_was_left_is_cancelled(kind: str, printed: str, file
 
 
 @every_kind
-def test_where_nothing_is_printed_any_more_nothing_is_cancelled(kind: str) -> None:
+def test_nothing_is_cancelled_when_nothing_is_printing(kind: str) -> None:
     with stand_in(kind) as (job, address):
         assert not cancel_on_server(parse_server_address(address), "box.gcode", 10.0)
         assert job.state == "idle"
@@ -206,7 +206,7 @@ def test_feed_is_set_and_the_emergency_stop_halts(kind: str) -> None:
 @pytest.mark.parametrize(("kind", "sent"), [
     ("octoprint", "M290 Z-0.010"), ("duet", "M290 R1 Z-0.010"), ("moonraker", "SET_GCODE_OFFSET Z_ADJUST=-0.010 MOVE=1"),
 ])  # fmt: skip
-def test_a_z_offset_is_the_firmwares_own_command_and_bounded(kind: str, sent: str) -> None:
+def test_a_z_offset_uses_the_command_of_the_firmware_and_is_bounded(kind: str, sent: str) -> None:
     control, told = Control(), set[tuple[float, str]]()
     with printing(kind) as (job, server):
         control.ask(Command.BABYSTEP, -0.01)
@@ -305,7 +305,7 @@ def test_a_feed_without_an_answer_may_be_in_force_and_is_set_back(monkeypatch: p
     assert job.commands == ["M220 S150", "M220 S100"]
 
 
-def test_a_print_that_is_left_still_needs_its_feed_and_the_end_says_so() -> None:
+def test_leaving_a_print_keeps_its_feed_rate_and_says_so() -> None:
     control = Control()
     with printing("moonraker") as (job, server):
         control.ask(Command.FEED, 150.0)
@@ -316,7 +316,7 @@ def test_a_print_that_is_left_still_needs_its_feed_and_the_end_says_so() -> None
     assert follower.kept == "the printer keeps the feed of 150 %: before another print send it M220 S100"
 
 
-def test_a_failed_print_tells_what_the_printer_keeps() -> None:
+def test_a_failed_print_reports_the_settings_that_the_printer_keeps() -> None:
     control = Control()
     with printing("moonraker") as (job, server):
         control.ask(Command.FEED, 150.0)
@@ -362,7 +362,7 @@ def test_a_z_offset_is_refused_where_the_firmware_is_not_known(kind: str) -> Non
 
 
 @every_kind
-def test_a_person_leaves_a_print_that_goes_on(kind: str) -> None:
+def test_the_user_leaves_a_print_that_continues(kind: str) -> None:
     with printing(kind) as (job, server):
         left = lambda: job.state == "printing"  # noqa: E731
         assert Follower(server, UPLOAD.name, 1, on_status=ignore, control=Control(), left=left).run() is PrintState.LEFT
@@ -387,7 +387,7 @@ def test_a_wrong_or_missing_key_is_one_sentence_without_it(
 
 
 @every_kind
-def test_no_key_stands_in_the_log(kind: str) -> None:
+def test_no_key_is_in_the_log(kind: str) -> None:
     logged: list[bytes] = []
     with stand_in(kind) as (_, address), session_with(address, lambda direction, data: logged.append(data)) as server:
         hand_over(server)
@@ -409,7 +409,7 @@ UPLOADS = {"octoprint": "/api/files/local", "moonraker": "/server/files/upload",
         (500, "a \x1b[31mred\x07 page " + "x" * 5000, "refuses the file: .*x\\.\\.\\.$"),
     ],
 )
-def test_what_a_server_refuses_is_one_sentence(kind: str, status: int, words: str, sentence: str) -> None:
+def test_a_refusal_of_a_server_is_one_sentence(kind: str, status: int, words: str, sentence: str) -> None:
     with stand_in(kind) as (job, address), session_with(address) as server:
         server.greet()
         job.refuse[UPLOADS[kind]] = (status, words.encode() if status == 500 else words)
@@ -421,7 +421,7 @@ def test_what_a_server_refuses_is_one_sentence(kind: str, status: int, words: st
 
 
 @every_kind
-def test_a_key_that_a_server_repeats_stands_in_no_message_and_no_log(kind: str) -> None:
+def test_a_key_repeated_by_a_server_is_in_no_message_and_no_log(kind: str) -> None:
     logged: list[bytes] = []
     with stand_in(kind) as (job, address), session_with(address, lambda direction, data: logged.append(data)) as server:
         server.greet()
@@ -454,7 +454,7 @@ def test_a_file_that_is_being_printed_is_not_replaced(kind: str, sentence: str) 
     assert job.file == "box.gcode"
 
 
-def test_a_moonraker_that_speaks_as_octoprint_is_told_apart() -> None:
+def test_moonraker_emulating_octoprint_is_recognised() -> None:
     with stand_in("octoprint") as (job, address), session_with(address) as server:
         job.refuse["/api/version"] = (200, b'{"text": "OctoPrint (Moonraker v0.3.1)"}')
         with pytest.raises(ServerError, match="use moonraker:HOST"):
@@ -462,7 +462,7 @@ def test_a_moonraker_that_speaks_as_octoprint_is_told_apart() -> None:
 
 
 @pytest.mark.parametrize(("kind", "real"), [("octoprint", "moonraker"), ("moonraker", "duet"), ("duet", "octoprint")])
-def test_another_kind_of_server_is_none(kind: str, real: str) -> None:
+def test_another_kind_of_server_is_refused(kind: str, real: str) -> None:
     with (
         stand_in(real) as (_, address),
         session_with(address.replace(real, kind, 1)) as server,
@@ -471,7 +471,7 @@ def test_another_kind_of_server_is_none(kind: str, real: str) -> None:
         server.greet()
 
 
-def test_a_session_of_a_duet_that_has_ended_is_begun_again() -> None:
+def test_an_expired_session_of_a_duet_is_renewed() -> None:
     sessions: set[str] = set()
     with stand_in("duet", sessions=sessions) as (_, address), session_with(address) as server:
         server.greet()
@@ -480,7 +480,7 @@ def test_a_session_of_a_duet_that_has_ended_is_begun_again() -> None:
 
 
 @every_kind
-def test_a_server_that_is_gone_during_a_print_is_told_of(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_loss_of_a_server_during_a_print_is_reported(kind: str, monkeypatch: pytest.MonkeyPatch) -> None:
     messages: list[str] = []
     with printing(kind) as (job, server):
 
@@ -522,7 +522,7 @@ HAPPENINGS = [
 @pytest.mark.parametrize(
     ("kind", "happens", "sentence"), [(kind, happens, words) for kinds, happens, words in HAPPENINGS for kind in kinds]
 )
-def test_what_became_of_a_print_is_told_as_far_as_it_is_known(
+def test_the_outcome_of_a_print_is_reported_as_far_as_it_is_known(
     kind: str, happens: Callable[[Job, str], None], sentence: str
 ) -> None:
     with printing(kind) as (job, server), pytest.raises(ServerError, match=sentence):
@@ -598,7 +598,7 @@ def certificate(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-def test_a_certificate_of_nobody_is_refused_until_its_authority_is_named(certificate: Path) -> None:
+def test_an_unknown_certificate_is_refused_until_its_authority_is_named(certificate: Path) -> None:
     with stand_in("moonraker", certificate=certificate) as (job, address):
         with pytest.raises(ServerError, match=r"certificate cannot be trusted .self-signed certificate.*ca_file"):
             greet(address)
@@ -630,7 +630,7 @@ def any_value(draw: random.Random, depth: int = 0) -> object:
 
 
 @every_kind
-def test_whatever_a_server_answers_there_is_a_sentence_or_a_value(kind: str) -> None:
+def test_any_answer_of_a_server_gives_a_sentence_or_a_value(kind: str) -> None:
     draw = random.Random(kind)
 
     class AnyAnswer(STAND_INS[kind]):  # type: ignore[misc]
@@ -652,7 +652,7 @@ def test_whatever_a_server_answers_there_is_a_sentence_or_a_value(kind: str) -> 
                         call()
 
 
-def test_an_answer_without_end_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_endless_answer_is_not_stored(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(http, "MOST_BYTES", 1_000_000)
     with stand_in("octoprint") as (job, address), session_with(address) as server:
         job.refuse["/api/version"] = (200, b"x" * 2_000_000)
@@ -684,7 +684,7 @@ def follow_unanswered(status: Callable[[], PrintStatus]) -> PrintState:
     return Follower(server, "box.gcode", 9, on_status=ignore, control=Control(), left=lambda: False).run()  # type: ignore[arg-type]
 
 
-def test_a_print_whose_start_was_not_answered_is_followed_all_the_same() -> None:
+def test_a_print_whose_start_was_not_answered_is_followed_anyway() -> None:
     phases = iter([PrintState.PRINTING] * 20)
     assert follow_unanswered(lambda: PrintStatus(next(phases, PrintState.DONE), file="box.gcode")) is PrintState.DONE
 

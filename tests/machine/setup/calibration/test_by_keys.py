@@ -28,7 +28,7 @@ def _folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
 
 
-def test_a_steady_hand_takes_twelve_touches_to_a_hundredth() -> None:
+def test_twelve_careful_touches_are_accurate_to_a_hundredth() -> None:
     real, mover = really(GENERIC, {"point_mm": (0.0, 0.8, -13.0)}, {"point_mm": (0.5, -0.4, 0.0)}), Mover()
     plan = plan_touches(GENERIC, MARK[2], float(np.hypot(*MARK[:2])))
     touches = KeyedTouches(GENERIC, plan, mover, steady_hand(mover, real, MARK), lambda line: None).run()  # type: ignore[arg-type]
@@ -80,14 +80,14 @@ def test_a_head_that_would_lean_over_the_plate_is_refused() -> None:
         pressed(Jog((jog.at_mm[0], jog.at_mm[1], jog.at_mm[2] - 12.0), -500.0, 1.0), "f", GENERIC, pose)
 
 
-def test_where_a_sign_is_unknown_the_mark_may_be_as_deep_as_it_is_either_way() -> None:
+def test_an_unknown_sign_allows_for_the_mark_on_either_side() -> None:
     unsure = GENERIC.model_copy(update={"uncalibrated": ("machine.tilt.sign",)})
     plan = plan_touches(GENERIC, 20.0)
     steep = max(range(12), key=lambda k: abs(plan.poses[k].tilt_deg))
     assert begin_jog(unsure, plan, steep, 100.0).lowest_mm <= begin_jog(GENERIC, plan, steep, 100.0).lowest_mm
 
 
-def test_the_command_saves_what_a_hand_has_touched_and_leaves_the_machine_level_and_cold(
+def test_the_command_saves_the_touches_and_leaves_the_machine_level_and_cold(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     real = really(GENERIC, {"point_mm": (0.0, 0.8, -13.0)}, {"point_mm": (0.5, -0.4, 0.0)})
@@ -104,7 +104,7 @@ def test_the_command_saves_what_a_hand_has_touched_and_leaves_the_machine_level_
     assert "12, A" in capsys.readouterr().err.replace("touch 12 of 12, ", "12, ")
 
 
-def test_without_a_terminal_it_is_one_sentence_and_nothing_is_opened(capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_terminal_it_is_refused_and_no_port_is_opened(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "--port", "/dev/nowhere"]) == 1
     assert "--port without --probe takes keys from a terminal, and there is none" in capsys.readouterr().err
     assert not own_folder("machine").exists()

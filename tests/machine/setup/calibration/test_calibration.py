@@ -24,7 +24,7 @@ def filled_in(text: str, touches: list[Touch]) -> str:
     return text
 
 
-def test_from_the_program_to_the_own_profile(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_calibration_leads_from_the_program_to_the_own_profile(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     machine, out = machine_of("open5x_voron0"), tmp_path / "touch.gcode"
     assert main(["calibrate", "--machine", "open5x_voron0", "--mark-height", "20", "-o", str(out)]) == 0
     real = really(machine, {"point_mm": (1.5, 0.0, -6.0), "sign": 1, "zero_deg": 0.5}, {"point_mm": (0.4, -0.9, 0.2)})
@@ -43,7 +43,7 @@ def test_from_the_program_to_the_own_profile(tmp_path: Path, capsys: pytest.Capt
     assert "--replace writes over it" in capsys.readouterr().err
 
 
-def test_replacing_keeps_what_else_the_own_profile_says_and_the_file_before(tmp_path: Path) -> None:
+def test_replacing_keeps_other_keys_of_the_own_profile_and_the_previous_file(tmp_path: Path) -> None:
     own = own_folder("machine") / "mine.toml"
     own.parent.mkdir(parents=True)
     own.write_text('inherits = "generic_ac"\n[machine]\nlift_mm = 7.5\n[machine.tilt]\nzero_deg = 9.0\n')
@@ -58,7 +58,7 @@ def test_replacing_keeps_what_else_the_own_profile_says_and_the_file_before(tmp_
     assert tomllib.loads(own.read_text())["inherits"] == "generic_ac"
 
 
-def test_directions_of_the_axes_are_found_where_they_are_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_directions_of_the_axes_are_fitted_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     real = really(machine_of("generic_ac"), {"axis": (0.9999, 0.01, 0.01)}, {"axis": (0.02, 0.0, 0.9998)})
     sheet = tmp_path / "sheet.csv"
     rows = [f"{t.pose.tilt_deg},{t.pose.turn_deg},{','.join(map(repr, t.at_mm))}" for t in touched(real)]
@@ -71,7 +71,7 @@ def test_directions_of_the_axes_are_found_where_they_are_asked_for(tmp_path: Pat
     assert load("leaning").machine.turn.axis == pytest.approx((0.02, 0.0, 0.9998), abs=1e-5)
 
 
-def test_a_way_to_calibrate_must_be_named(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_calibration_method_must_be_named(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["calibrate", "--machine", "open5x_voron0"]) == 1
     assert "one of --port PORT, -o OUT.gcode, --measured FILE and --printed FILE.gcode is expected" in capsys.readouterr().err
     assert not own_folder("machine").exists()

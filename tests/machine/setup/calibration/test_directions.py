@@ -41,7 +41,7 @@ def test_touches_two_hundredths_off_predict_the_reach_to_a_twentieth() -> None:
     assert max(worst_predictions_mm(range(10))) < 0.05
 
 
-def test_touches_at_one_turn_do_not_tell_the_directions() -> None:
+def test_touches_at_one_turn_do_not_determine_the_directions() -> None:
     random = np.random.default_rng(1)
     touches = touches_at(machine_of("generic_ac"), (0.0, 10.0, 20.0, 30.0, 40.0), 1, MARK, 0.0, random)
     with pytest.raises(ProfileError, match="the touches do not determine"):

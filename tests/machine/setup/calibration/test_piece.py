@@ -67,7 +67,7 @@ def test_readings_of_nought_change_nothing() -> None:
     assert correction.machine.tilt.point_mm == pytest.approx(GENERIC.tilt.point_mm)
 
 
-def test_what_is_not_read_is_not_needed() -> None:
+def test_unread_pads_are_optional() -> None:
     random = np.random.default_rng(7)
     true, piece = off(GENERIC, random), standing(GENERIC)
     readings = piece.laid_aside_mm(true)[None]

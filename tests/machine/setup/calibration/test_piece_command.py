@@ -45,7 +45,7 @@ def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return own_folder("machine") / "mine.toml"
 
 
-def test_pads_lie_on_four_sides_after_quarter_turns_and_a_tilt_of_60(program: ParsedProgram) -> None:
+def test_pads_are_on_four_sides_after_quarter_turns_and_a_tilt_of_60(program: ParsedProgram) -> None:
     piece = read_piece(program, GENERIC, "piece.gcode")
     assert [pad.number for pad in piece.pads] == [1, 2, 3, 4]
     assert {abs(round(pad.pose.tilt_deg)) for pad in piece.pads} == {60}
@@ -62,7 +62,7 @@ def test_the_piece_is_cut_by_its_plan_whatever_the_search_settings_are(setting: 
     assert leans == [0, 60, 60, 60, 60]
 
 
-def test_what_a_true_machine_lays_down_is_as_far_aside_as_is_told(program: ParsedProgram) -> None:
+def test_a_simulated_misaligned_machine_prints_pads_with_the_predicted_offsets(program: ParsedProgram) -> None:
     true = really(GENERIC, {"zero_deg": 0.3, "point_mm": (0.0, 0.2, -12.3)}, {"point_mm": (0.25, -0.1, 0.0)})
     piece = read_piece(program, GENERIC, "piece.gcode")
     shifts = [_mean_shift_mm(program, true, part, pad.middle_mm) for part, pad in enumerate(piece.pads, start=2)]
@@ -98,7 +98,7 @@ def test_readings_are_text_and_back() -> None:
         ("0,0,1.2 0,-99 0,0 0,0", "pad 2: up -99 cannot be: -30 to 30 is allowed"),
     ],
 )
-def test_readings_that_nobody_can_have_read_are_refused(text: str, sentence: str) -> None:
+def test_impossible_readings_are_refused(text: str, sentence: str) -> None:
     with pytest.raises(ProfileError, match=sentence):
         parse_readings(text)
 
@@ -129,7 +129,7 @@ def test_the_command_saves_what_the_readings_say(gcode: Path, mine: Path, capsys
         (["--readings", READINGS, "--directions"], "--printed excludes -o"),
     ],
 )
-def test_what_cannot_be_evaluated_is_one_sentence_and_saves_nothing(
+def test_readings_that_cannot_be_evaluated_are_refused_and_nothing_is_saved(
     gcode: Path, mine: Path, capsys: pytest.CaptureFixture[str], more: list[str], sentence: str
 ) -> None:
     assert main(["calibrate", "--printed", str(gcode), *more]) == 1
@@ -143,7 +143,7 @@ def test_good_readings_leave_the_profile_as_it_is(gcode: Path, mine: Path, capsy
     assert not mine.parent.exists()
 
 
-def test_in_a_terminal_the_pads_are_asked_for_one_by_one(
+def test_a_terminal_asks_for_the_pads_one_by_one(
     gcode: Path, mine: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     person = Person("2 -1 1.2", "0.5", "b", "2,-1,1.25", "0,0.5,-", "1,0,1.2", "-1,0,1.15")
@@ -161,7 +161,7 @@ def _without_sources(file: Path) -> dict[str, object]:
     return {"tilt": machine["tilt"], "turn": machine["turn"]}
 
 
-def test_nobody_types_readings_that_could_not_be_saved(gcode: Path, mine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_readings_are_not_requested_if_they_could_not_be_saved(gcode: Path, mine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     mine.parent.mkdir(parents=True)
     mine.write_text('inherits = "generic_ac"\n')
     person = Person()
@@ -171,13 +171,13 @@ def test_nobody_types_readings_that_could_not_be_saved(gcode: Path, mine: Path, 
     assert person.asked == []
 
 
-def test_one_part_that_is_asked_for_is_printed_without_the_demos_plan(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_request_for_one_part_ignores_the_plan_of_the_demo(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["decompose", "demo:calibration", "--parts", "1", "--as-is", *COARSE, "--json", "-"]) == 0
     assert len(json.loads(capsys.readouterr().out)["parts"]) == 1
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="Chromium is not installed: the page is not tried in a browser")
-def test_the_page_tells_the_same_corrections_and_the_command_that_saves_them(program: ParsedProgram, tmp_path: Path) -> None:
+def test_the_page_shows_the_same_corrections_and_the_command_that_saves_them(program: ParsedProgram, tmp_path: Path) -> None:
     piece = read_piece(program, GENERIC, "piece.gcode")
     page = tmp_path / "page.html"
     page.write_bytes(piece_page(piece, "generic_ac", "piece.gcode"))

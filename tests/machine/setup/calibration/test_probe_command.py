@@ -36,7 +36,7 @@ def printer(name: str, **fault: float) -> SimulatedPrinter:
 
 
 @pytest.mark.parametrize("name", ["generic_ac", "gen5x", "fractal5pro"])
-def test_a_machine_measures_itself_and_the_profile_holds_what_it_found(
+def test_a_machine_measures_itself_and_the_profile_has_the_result(
     name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     png, real = tmp_path / "left.png", misaligned(machine_of(name), np.random.default_rng(7))
@@ -77,7 +77,7 @@ def test_a_probe_that_fails_leaves_the_tip_raised_and_nothing_saved(
     assert not own_folder("machine").exists()
 
 
-def test_a_printer_without_the_command_is_told_what_it_needs(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_printer_without_the_probe_command_is_refused_with_what_it_needs(capsys: pytest.CaptureFixture[str]) -> None:
     with SimulatedPrinter(machine_of("generic_ac"), inf) as simulated:
         assert main(["calibrate", "--machine", "generic_ac", "--probe", "--port", simulated.path]) == 1
     assert "Marlin built with G38_PROBE_TARGET is needed" in capsys.readouterr().err
@@ -110,7 +110,7 @@ def test_options_that_do_not_go_together_are_refused(
         (["--machine", "generic_ac", "--port", "sim", "--mark-radius", "300"], "a mark 300 mm from the middle cannot be used"),
     ],
 )
-def test_what_cannot_be_measured_is_said_in_a_sentence(
+def test_an_impossible_measurement_is_refused_in_one_sentence(
     arguments: list[str], sentence: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["calibrate", "--probe", *arguments]) == 1
@@ -144,19 +144,19 @@ def test_older_klipper_says_where_the_tip_was() -> None:
     assert prober(Session("probe at 10.000,20.000 is z=3.912500", "Result is z=3.912500"), -1.5).seek(0.0) == 3.9125
 
 
-def test_klipper_of_today_says_where_the_bed_is_its_own_offset_taken_off() -> None:
+def test_current_klipper_reports_the_bed_position_without_its_offset() -> None:
     session = Session(
         "probe: at 10.000,20.000 bed will contact at z=2.4", "Result: at 10.000,20.000 estimate contact at z=2.400000"
     )
     assert prober(session, -1.5).seek(0.0) == pytest.approx(3.9)
 
 
-def test_an_answer_that_is_none_is_no_contact() -> None:
+def test_an_unrelated_answer_is_not_a_contact() -> None:
     with pytest.raises(PrinterError, match="'probe: open' is not understood"):
         prober(Session("probe: open")).seek(0.0)
 
 
-def test_nothing_met_is_none_and_any_other_error_is_the_firmware_s() -> None:
+def test_no_contact_gives_none_and_other_errors_are_those_of_the_firmware() -> None:
     assert prober(Session(error="!! No trigger on probe after full movement")).seek(0.0) is None
     with pytest.raises(FirmwareError, match="Must home before probe"):
         prober(Session(error="!! Must home before probe")).seek(0.0)

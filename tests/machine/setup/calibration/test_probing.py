@@ -40,7 +40,7 @@ def test_a_flat_tip_touches_with_its_nearer_edge() -> None:
 
 
 @pytest.mark.parametrize("flat_mm", [0.0, 0.5])
-def test_exact_contacts_give_the_exact_centre_whatever_the_flat_of_the_tip(flat_mm: float) -> None:
+def test_exact_contacts_give_the_exact_centre_for_any_tip_flat(flat_mm: float) -> None:
     centre = (0.7, -0.4, 31.25)
     assert ball_centre(contacts(centre, flat_mm), 10.0, seek_flat=True) == pytest.approx(centre, abs=1e-6)
 
@@ -51,7 +51,7 @@ def test_two_pairs_across_the_middle_give_the_closed_form() -> None:
     assert ball_centre(seen, 10.0) == pytest.approx((0.0, 0.0, 0.0), abs=1e-9)
 
 
-def test_contacts_of_no_such_ball_are_refused() -> None:
+def test_contacts_that_fit_no_such_ball_are_refused() -> None:
     with pytest.raises(PrinterError, match="the contacts are not those of a ball 4 mm in diameter"):
         ball_centre(contacts((0.0, 0.0, 0.0)), 2.0)
 
@@ -85,7 +85,7 @@ def test_larger_tilts_come_only_after_the_signs_are_known() -> None:
     assert tilts[-1] == 0.0
 
 
-def test_a_probe_beside_the_nozzle_serves_where_it_reaches() -> None:
+def test_a_probe_beside_the_nozzle_is_used_where_it_reaches() -> None:
     measuring, prober = probed(machine_of("generic_ac"), 2, offset_mm=(-20.0, 5.0, -2.0))
     found = calibrate(machine_of("generic_ac"), measuring.run(), HEIGHT_MM, directions=True)
     assert found.rms_mm < 1e-4

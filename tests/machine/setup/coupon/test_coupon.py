@@ -45,7 +45,7 @@ def test_the_bars_are_estimated_to_be_printed_within_two_hours() -> None:
     assert estimate(coupon(SHAPES["bend"], profile).parts, profile).time_s <= TWO_HOURS_S
 
 
-def test_from_the_program_by_a_simulated_print_to_own_profiles(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_simulated_print_leads_from_the_program_to_own_profiles(capsys: pytest.CaptureFixture[str]) -> None:
     coarse = ["--set", "process.layer_height_mm=0.4"]
     assert main(["coupon", "-o", "coupon.gcode", "--html", "bars.html", "--png", "bars.png", *coarse]) == 0
     assert "error" not in capsys.readouterr().out
@@ -93,7 +93,7 @@ def test_strengths_and_winners_are_saved_with_date_and_source(capsys: pytest.Cap
     assert (own_folder("material") / "mine.toml.before").exists()
 
 
-def test_where_nothing_wins_the_process_stays_and_a_joint_without_a_bar_beside_it_is_a_share_of_the_profile_s_strength(
+def test_without_a_winner_the_process_stays_and_joints_have_a_share_of_the_strength(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     sheet = broken((1.0,) * 4, 1, 0.01, 2)
@@ -149,7 +149,7 @@ def test_the_report_is_a_table_and_saves_nothing(capsys: pytest.CaptureFixture[s
         ([], "one of -o OUT.gcode and --measured FILE is expected"),
     ],
 )
-def test_a_wrong_word_is_told_in_one_sentence_and_nothing_is_written(
+def test_a_wrong_argument_is_refused_in_one_sentence_and_nothing_is_written(
     arguments: list[str], said: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     written(broken(TRUTH, 1))
@@ -167,7 +167,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, *lines: str) -> Person:
     return person
 
 
-def test_a_person_is_led_through_the_bars_and_ends_with_own_profiles(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_user_is_led_through_the_bars_to_own_profiles(monkeypatch: pytest.MonkeyPatch) -> None:
     loads = broken(TRUTH, 3, 0.05, 1).loads_n
     lines = [" ".join(f"{load:.1f}" for load in of_bar) for of_bar in loads]
     first_in_kg = " ".join(f"{load / 9.80665:.2f}kg" for load in loads[0])
@@ -198,7 +198,9 @@ def test_a_load_is_judged_as_soon_as_it_is_typed_and_ctrl_c_leaves_nothing(
     assert not own_folder("material").exists()
 
 
-def test_too_few_loads_are_said_and_asked_again(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_too_few_loads_are_reported_and_requested_again(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     loads = broken(TRUTH, 1, 0.05, 1).loads_n
     lines = [f"{of_bar[0]:.1f}" for of_bar in loads]
     asked(monkeypatch, *lines[:4], *["s"] * 8, *lines)
@@ -206,7 +208,7 @@ def test_too_few_loads_are_said_and_asked_again(monkeypatch: pytest.MonkeyPatch,
     assert load().material.cold_weld_factor < 1.0
 
 
-def test_what_is_there_already_is_told_before_anything_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_existing_files_are_reported_before_any_question(monkeypatch: pytest.MonkeyPatch) -> None:
     assert main(["coupon", "--measured", written(broken(TRUTH, 3, 0.01))]) == 0
     monkeypatch.setattr("builtins.input", Person())
     with pytest.raises(OutputError, match="--replace writes over it"):

@@ -10,7 +10,7 @@ from profiles.errors import ProfileError
 from profiles.profile import load
 
 
-def test_the_effects_of_any_factors_are_told_apart_and_from_where_a_bar_stands() -> None:
+def test_effects_of_factors_are_distinguished_from_each_other_and_from_bar_positions() -> None:
     rows = np.array(signs(5))
     height = np.repeat([-1, 1], 4)  # low bars first
     for one, other in combinations([*rows.T, height, np.ones(8)], 2):
@@ -23,13 +23,13 @@ def test_no_effect_of_one_of_four_factors_is_mixed_with_that_of_two_together() -
         assert rows[:, k] @ (rows[:, i] * rows[:, j]) == 0
 
 
-def test_half_of_the_bars_have_the_other_value_and_one_none_at_all() -> None:
+def test_half_of_the_bars_have_the_other_value_and_one_has_no_joint() -> None:
     bars = settings_of_bars([Factor("interface_flow", 1.05, 1.15), Factor("interface_overlap", 0.5, 0.75)])
     assert sum("interface_flow" in own for own in bars) == sum("interface_overlap" in own for own in bars) == 4
     assert {} in settings_of_bars(factors(load()))
 
 
-def test_the_usual_factors_differ_from_the_process_whatever_it_has() -> None:
+def test_the_default_factors_differ_from_any_process() -> None:
     for setting in [f"process.{key}={value}" for key, values in USUAL.items() for value in values]:
         assert all(factor.own != factor.other for factor in factors(load(settings=[setting])))
 
@@ -46,7 +46,7 @@ def test_the_usual_factors_differ_from_the_process_whatever_it_has() -> None:
         ([f"walls={k}" for k in range(6)], "--vary is given 6 times: 8 bars can distinguish at most 5 settings"),
     ],
 )
-def test_what_bars_cannot_be_printed_with_is_refused(given: list[str], said: str) -> None:
+def test_factors_that_bars_cannot_be_printed_with_are_refused(given: list[str], said: str) -> None:
     with pytest.raises(ProfileError) as refusal:
         factors(load(), given)
     assert said in str(refusal.value)

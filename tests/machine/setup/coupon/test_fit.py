@@ -30,25 +30,25 @@ def test_with_ten_per_cent_scatter_the_true_settings_win_in_95_of_100_runs(plate
     assert right >= 190
 
 
-def test_where_nothing_matters_nothing_wins_in_95_of_100_runs() -> None:
+def test_without_an_effect_no_setting_wins_in_95_of_100_runs() -> None:
     assert sum(evaluate(broken((1.0,) * 4, 2, 0.1, seed)).won == {} for seed in range(200)) >= 190
 
 
-def test_the_scatter_and_the_strength_of_the_best_joint_are_found() -> None:
+def test_the_scatter_and_the_strength_of_the_best_joint_are_estimated() -> None:
     outcomes = [evaluate(broken(TRUTH, 3, 0.1, seed)) for seed in range(100)]
     assert np.sqrt(np.mean([outcome.scatter**2 for outcome in outcomes])) == pytest.approx(0.1, rel=0.05)
     best = np.median([outcome.best_joint_mpa for outcome in outcomes])
     assert best == pytest.approx(12.0 * 1.25**2, rel=0.03)
 
 
-def test_what_scatter_hides_keeps_the_default_and_says_how_large_an_effect_would_show() -> None:
+def test_an_effect_hidden_by_scatter_keeps_the_default_and_states_the_detectable_effect() -> None:
     (effect,) = evaluate(broken((1.05,), 1, 0.1, 3)).effects
     assert not effect.significant
     assert not effect.wins
     assert effect.least_ratio > 1.1
 
 
-def test_a_setting_that_harms_is_told_and_does_not_win() -> None:
+def test_a_harmful_setting_is_reported_and_does_not_win() -> None:
     effect = evaluate(broken(TRUTH, 3, 0.05, 1)).effects[1]
     assert effect.significant
     assert not effect.wins
@@ -72,7 +72,7 @@ def test_too_few_loads_are_refused(told: int) -> None:
         evaluate(replace(sheet, loads_n=loads))
 
 
-def test_loads_that_do_not_tell_settings_apart_are_refused() -> None:
+def test_loads_that_cannot_distinguish_settings_are_refused() -> None:
     sheet = broken(TRUTH, 3)
     loads = tuple(load if k in (0, 1, 8, 9, 10) else (NAN,) for k, load in enumerate(sheet.loads_n))
     with pytest.raises(ProfileError, match="do not distinguish the settings"):
@@ -88,7 +88,7 @@ def test_student_s_t_is_that_of_a_numerical_integral(freedom: int) -> None:
         assert student_beyond(t, freedom) == pytest.approx(1.0 - inside, abs=1e-4)
 
 
-def test_five_factors_are_told_too() -> None:
+def test_five_factors_are_evaluated_too() -> None:
     more = (*FACTORS, replace(FACTORS[0], key="walls"))
     sheet = replace(broken((*TRUTH, 1.1), 1), factors=more)
     assert [effect.ratio for effect in evaluate(sheet).effects] == pytest.approx((*TRUTH, 1.1))

@@ -12,7 +12,7 @@ from profiles.profile import load
 
 
 @pytest.mark.parametrize("name", ["generic_ac", "fractal5pro", "linuxcnc_xyzac", "trident_5axis", "open5x_voron0"])
-def test_every_part_stands_clear_of_the_table_and_nothing_above_its_base(name: str) -> None:
+def test_every_part_is_clear_of_the_table_and_above_its_base(name: str) -> None:
     profile = load(name)
     made = coupon(BEND, profile)  # Decomposition itself checks volumes and order
     assert len(made.parts) == 9
@@ -32,7 +32,7 @@ def test_there_are_twelve_bars_eight_of_them_in_two_parts(shape: Shape) -> None:
 
 
 @pytest.mark.parametrize("shape", [BEND, TENSILE])
-def test_a_joint_lies_between_two_parts_and_is_as_large_as_the_bar_s_section(shape: Shape) -> None:
+def test_a_joint_is_between_two_parts_and_as_large_as_the_section_of_the_bar(shape: Shape) -> None:
     parts = coupon(shape, load()).parts
     below = parts[0].mesh
     for part in parts[1:]:
@@ -55,7 +55,7 @@ def test_a_joint_lies_between_two_parts_and_is_as_large_as_the_bar_s_section(sha
         ("generic_ac", "process.self_supporting_angle_deg=15", "process.self_supporting_angle_deg is 15: at least 20 deg"),
     ],
 )
-def test_a_machine_that_cannot_print_it_is_told_why(machine: str, setting: str, said: str) -> None:
+def test_a_machine_that_cannot_print_the_bars_is_refused_with_the_reason(machine: str, setting: str, said: str) -> None:
     with pytest.raises(MoveError) as refusal:
         coupon(BEND, load(machine, settings=[setting]))
     assert said in str(refusal.value)

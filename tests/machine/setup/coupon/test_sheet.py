@@ -55,7 +55,7 @@ def test_it_says_of_each_bar_what_it_is() -> None:
         ("[[bar]]\nnumber = 1\nloads_n = [nan]", "", "bar must be a list of tables"),
     ],
 )
-def test_what_cannot_stand_in_a_sheet_is_told(tmp_path: Path, before: str, after: str, said: str) -> None:
+def test_invalid_values_in_a_sheet_are_refused(tmp_path: Path, before: str, after: str, said: str) -> None:
     text = sheet_text(empty_sheet(BEND, ("generic_ac", "pla", "standard"), FACTORS))
     if not after:
         text, before, after = text.partition("[[bar]]")[0], "coupon =", "bar = 3\ncoupon ="

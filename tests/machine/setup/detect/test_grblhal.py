@@ -64,7 +64,7 @@ def test_hard_limits_leave_the_pull_off_at_both_ends() -> None:
     assert values(found(DUMP.replace("$21=0", "$21=1")), "X")["limits"] == [-198.0, -2.0]
 
 
-def test_letters_buffer_and_corner_are_told() -> None:
+def test_letters_buffer_and_corner_are_read() -> None:
     told = found()
     assert (told.firmware, told.rotary, told.settings["receive_bytes"].value) == ("grblHAL 1.1f.20240801", "AC", 1024)
     assert told.settings["junction_speed_mm_s"].value == 4.3947  # sqrt(400 x 0.02 x (1 + sqrt 2))
@@ -79,7 +79,7 @@ def test_letters_that_the_dump_does_not_name_are_not_guessed() -> None:
     assert found(three).rotary == ""
 
 
-def test_without_376_nothing_says_that_an_axis_turns() -> None:
+def test_without_376_no_axis_is_known_to_be_rotary() -> None:
     told = found(DUMP.replace("$376=5\n", ""))
     assert (told.rotary, list(told.doubtful)) == ("", ["A", "C"])
     with pytest.raises(ProfileError, match=r"it has no \$376, which says whether A turns.*: --base NAME"):

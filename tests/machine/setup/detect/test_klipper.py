@@ -110,14 +110,14 @@ def test_the_filaments_limits_are_worked_out_where_they_are_not_set() -> None:
     assert settings["extruder_speed_mm_s"].value == 45.0
 
 
-def test_nozzle_heaters_corner_and_probe_are_told() -> None:
+def test_nozzle_heaters_corner_and_probe_are_read() -> None:
     told = found()
     wanted = {"head.nozzle_mm": 0.6, "nozzle_limit_c": 265.0, "bed_limit_c": 125.0, "junction_speed_mm_s": 5.0, "arcs": False}
     assert {key: told.settings[key].value for key in wanted} == wanted
     assert told.probe == "the probe [bltouch]"
 
 
-def test_moonraker_tells_the_same() -> None:
+def test_moonraker_reports_the_same() -> None:
     told = {
         "printer": {"kinematics": "cartesian", "max_velocity": 200.0, "max_accel": 1000.0, "max_z_velocity": 200.0},
         **{f"stepper_{letter}": {"position_min": 0.0, "position_max": 210.0} for letter in "xyz"},
@@ -129,7 +129,7 @@ def test_moonraker_tells_the_same() -> None:
     assert values(found(text), "Z") == {"speed": 200.0, "acceleration": 1000.0, "limits": [0.0, 210.0]}
 
 
-def test_what_may_stand_in_a_file_that_is_missing_is_not_taken_for_absent() -> None:
+def test_settings_that_may_be_in_a_missing_file_are_not_assumed_absent() -> None:
     text = (STEPPERS + GIMBAL).replace("steppers/*.cfg", "mainsail.cfg").replace("[heater_bed]\nmax_temp: 125\n", "")
     told = read(ConfigText("printer.cfg", text))
     assert {"bed_limit_c", "arcs"}.isdisjoint(told.settings)
@@ -166,7 +166,7 @@ def test_a_stepper_that_may_move_a_screw_or_a_belt_is_not_taken_for_the_tilt(nam
         propose(told)
 
 
-def test_a_full_turn_for_each_turn_is_an_axis_that_turns_whatever_its_letter() -> None:
+def test_a_rotation_distance_of_360_makes_a_rotary_axis_of_any_letter() -> None:
     told = found(GIMBAL, STEPPERS + "[manual_stepper table_u]\nrotation_distance: 360\ngear_ratio: 40:1\nendstop_pin: PG10\n")
     assert (told.rotary, told.doubtful) == ("ABU", {})
 
@@ -178,7 +178,7 @@ def test_kinematics_that_are_not_known_are_refused(kinematics: str) -> None:
         found(GIMBAL.replace("corexy", kinematics))
 
 
-def test_of_a_and_b_nothing_says_which_tilts_until_a_base_is_named() -> None:
+def test_the_tilt_axis_among_a_and_b_is_unknown_until_a_base_profile_is_named() -> None:
     with pytest.raises(ProfileError, match="has the rotary axes A B, and nothing says which tilts and which turns: --base NAME"):
         propose(found())
     values = propose(found(), "fractal5pro").values
@@ -191,11 +191,11 @@ def test_other_steppers_are_named_and_left_out() -> None:
     assert any("[manual_stepper gear_stepper]" in remark for remark in told.remarks)
 
 
-def test_an_axis_may_have_a_limit_of_its_own() -> None:
+def test_an_axis_may_have_its_own_limit() -> None:
     assert values(found(GIMBAL.replace("corexy", "limited_corexy\nmax_x_accel: 1500")), "X")["acceleration"] == 1500.0
 
 
-def test_a_delta_tells_no_reach() -> None:
+def test_a_delta_reports_no_reach() -> None:
     told = found(GIMBAL.replace("corexy", "delta"))
     assert "limits" not in told.axes["X"]
     assert "delta" in told.remarks[0]
@@ -218,6 +218,6 @@ def test_a_delta_tells_no_reach() -> None:
         ("max: 5\n[printer]\n", "", "'max: 5' stands in no section"),
     ],
 )
-def test_what_is_cut_off_or_absurd_is_one_sentence(text: str, steppers: str, sentence: str) -> None:
+def test_a_truncated_or_absurd_answer_is_refused_in_one_sentence(text: str, steppers: str, sentence: str) -> None:
     with pytest.raises(ProfileError, match=sentence):
         found(text, steppers)

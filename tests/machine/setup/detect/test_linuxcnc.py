@@ -56,13 +56,13 @@ def values(found: Found, letter: str) -> dict[str, object]:
     return {key: reading.value for key, reading in found.axes[letter].items()}
 
 
-def test_the_joints_tell_the_reach_where_the_kinematics_follow_the_table() -> None:
+def test_the_joints_give_the_reach_when_the_kinematics_follow_the_table() -> None:
     assert recognise(INI)
     assert values(found(), "X") == {"speed": 60.0, "acceleration": 500.0, "limits": [-150.0, 152.5]}
     assert values(found(INI.replace("xyzac-trt-kins", "trivkins")), "X")["limits"] == [-900.0, 900.0]
 
 
-def test_axes_that_turn_are_told_by_their_joints_and_1e99_bounds_nothing() -> None:
+def test_rotary_axes_follow_from_their_joints_and_1e99_means_no_limit() -> None:
     told = found()
     assert (told.rotary, told.name) == ("AC", "Cradle mill")
     assert values(told, "A") == {"speed": 25.0, "acceleration": 120.0, "limits": [-95.0, 20.0]}
@@ -92,7 +92,7 @@ def test_a_joint_that_is_linear_is_no_axis_that_turns() -> None:
         propose(found(INI, AXES.replace("[JOINT_3]", "[JOINT_3]\nTYPE = LINEAR")))
 
 
-def test_of_three_rotary_axes_nothing_says_which_two_turn_the_table() -> None:
+def test_three_rotary_axes_leave_the_two_of_the_table_unknown() -> None:
     nine = INI.replace("X Y Z A C", "X Y Z A B C").replace("xyzac-trt-kins", "trivkins")
     with pytest.raises(ProfileError, match="LinuxCNC has the rotary axes A B C, and nothing says which tilts"):
         propose(found(nine))
@@ -121,7 +121,7 @@ def test_a_file_of_before_2_8_numbers_its_axes() -> None:
         (INI, AXES + "MAX_VEL", "neither a section nor a setting"),
     ],
 )
-def test_what_is_cut_off_or_absurd_is_one_sentence(text: str, axes: str, sentence: str) -> None:
+def test_a_truncated_or_absurd_file_is_refused_in_one_sentence(text: str, axes: str, sentence: str) -> None:
     with pytest.raises(ProfileError, match=sentence):
         found(text, axes)
 

@@ -55,24 +55,24 @@ def test_jerk_is_the_lesser_of_x_and_y() -> None:
     assert found(LOG.replace("J0.02", "X9.00 Y7.50 Z0.40")).settings["junction_speed_mm_s"].value == 7.5
 
 
-def test_name_letters_probe_and_arcs_are_told() -> None:
+def test_name_letters_probe_and_arcs_are_read() -> None:
     told = found(LOG)
     assert (told.firmware, told.name, told.rotary, told.probe) == ("Marlin 2.1.2.5 (Jul  1 2024)", "Gimbal", "AC", "a Z probe")
     assert told.settings["arcs"].value is True
 
 
-def test_the_area_of_m115_stands_for_m211_where_that_is_not_there() -> None:
+def test_the_area_of_m115_replaces_a_missing_m211() -> None:
     area = "area:{full:{min:{x:-5.00,y:0.00,z:0.00,i:-91.00},max:{x:200.00,y:210.00,z:180.00,i:92.00}}}"
     told = found(LOG.split("  M211")[0] + area)
     assert (told.axes["X"]["limits"].value, told.axes["A"]["limits"].value) == ([-5.0, 200.0], [-91.0, 92.0])
 
 
-def test_what_a_host_puts_before_a_line_does_not_matter() -> None:
+def test_prefixes_of_a_host_log_are_ignored() -> None:
     hosted = "\n".join(f"12:00:01 Recv: {line}" for line in LOG.splitlines())
     assert found(hosted).axes == found(LOG).axes
 
 
-def test_what_a_person_has_written_behind_a_line_does_not_matter() -> None:
+def test_comments_after_a_line_are_ignored() -> None:
     noted = "\n".join(
         f"{line}   #{line.split()[0]} - M203 set" if line.startswith("echo:  M") else line for line in LOG.splitlines()
     )
@@ -92,7 +92,7 @@ def test_of_several_extruders_the_first_counts() -> None:
         "echo: send G20 for inches",
     ],
 )
-def test_a_sentence_about_a_command_is_none(line: str) -> None:
+def test_a_sentence_about_a_command_is_not_an_answer(line: str) -> None:
     assert found(f"{line}\n{LOG}{line}\n").axes == found(LOG).axes
 
 
@@ -105,13 +105,13 @@ SOURCES = {
 
 
 @pytest.mark.parametrize("name", SOURCES)
-def test_the_source_that_marlin_is_built_from_is_told_from_what_the_printer_answers(name: str) -> None:
+def test_configuration_sources_of_marlin_are_distinguished_from_answers(name: str) -> None:
     expected = rf"^{name}: it is source that a firmware is built from .*: the answers to M115, M503 and M211 are expected"
     with pytest.raises(ProfileError, match=expected):
         read(ConfigText(name, SOURCES[name]))
 
 
-def test_nothing_says_that_an_axis_u_turns() -> None:
+def test_an_axis_u_is_not_assumed_to_be_rotary() -> None:
     told = found(LOG.replace(" A", " U"))
     assert (told.rotary, list(told.doubtful)) == ("C", ["U"])
     with pytest.raises(ProfileError, match=r"^m503.log: M203 does not say whether U turns, .*: --base NAME"):
@@ -122,7 +122,7 @@ def test_a_base_that_follows_the_table_does_not_make_plain_axes_follow_it() -> N
     assert propose(found(LOG)).values["machine.coordinates"].value == "table"
 
 
-def test_how_far_cables_let_the_table_wind_is_measured() -> None:
+def test_the_winding_limit_of_the_cables_must_be_measured() -> None:
     assert "machine.turn.budget_deg" in propose(found(LOG)).measured
 
 
@@ -150,7 +150,7 @@ def test_half_a_log_inches_and_reversed_limits_are_refused(old: str, new: str, s
         found(LOG.replace(old, new))
 
 
-def test_the_simulated_printer_tells_what_is_read() -> None:
+def test_the_simulated_printer_reports_all_values_that_are_read() -> None:
     settings = Motion(load("generic_ac").machine).settings()
     text = "\n".join(line for command in ("M503", "M211") for line in settings_report(command, settings))
     assert recognise(text)

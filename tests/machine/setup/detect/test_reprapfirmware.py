@@ -64,12 +64,12 @@ def test_heaters_are_those_of_tool_and_bed() -> None:
     assert found(CRADLE.replace("M140 H0", "M140 H-1")).settings["bed_limit_c"].value == 0.0
 
 
-def test_name_letters_and_probe_are_told() -> None:
+def test_name_letters_and_probe_are_read() -> None:
     told = found()
     assert (told.name, told.rotary, told.probe) == ("Cradle", "BC", "a BLTouch as its probe")
 
 
-def test_nothing_says_that_u_and_v_turn_until_r1_or_a_base_does() -> None:
+def test_u_and_v_are_rotary_only_by_r1_or_a_base_profile() -> None:
     config = CRADLE.replace(" B0", " U0").replace(" C0", " V0").replace(" B-", " U-").replace(" C-", " V-")
     speeds = SPEEDS.replace("B", "U").replace("C", "V")
     with pytest.raises(ProfileError, match=r"^config.g: nothing says whether U turns, as R1 of M584 does, .*: --base NAME"):
@@ -90,7 +90,7 @@ def test_kinematics_that_are_not_known_are_refused(command: str, named: str) -> 
         found(CRADLE.replace("M669 K1", command))
 
 
-def test_a_delta_tells_no_reach() -> None:
+def test_a_delta_reports_no_reach() -> None:
     told = found(CRADLE + "M665 L200 R100 B80\n")
     assert "limits" not in told.axes["X"]
     assert "delta" in told.remarks[0]
@@ -110,7 +110,7 @@ def test_a_macro_that_is_not_beside_the_file_is_named() -> None:
     assert told.remarks == ["drives.g is not beside it: its settings are unknown"]
 
 
-def test_an_axis_of_which_no_speed_is_told_is_kept_and_said() -> None:
+def test_an_axis_without_a_reported_speed_is_kept_with_a_remark() -> None:
     told = found(CRADLE, SPEEDS.replace(" B1800", ""))
     assert (told.rotary, "speed" in told.axes["B"]) == ("BC", False)
     assert told.remarks == ["M584 makes B, whose speed no M203 gives"]
@@ -120,7 +120,7 @@ def test_letters_that_m584_does_not_make_are_passed_over() -> None:
     assert found(CRADLE + "M208 A-5:5\nM203 A60\n").rotary == "BC"
 
 
-def test_what_only_the_board_works_out_is_said() -> None:
+def test_values_computed_by_the_board_are_reported_as_unknown() -> None:
     told = found(CRADLE.replace("S290", "S{global.hot}"))
     assert "nozzle_limit_c" not in told.settings
     assert [*map(terminal_words, told.remarks)] == [
@@ -181,6 +181,6 @@ def test_a_config_g_is_not_taken_for_a_log_of_marlin() -> None:
         (model(min=95.0), "", "limits from 95 to 90"),
     ],
 )
-def test_what_is_cut_off_or_absurd_is_one_sentence(text: str, speeds: str, sentence: str) -> None:
+def test_a_truncated_or_absurd_answer_is_refused_in_one_sentence(text: str, speeds: str, sentence: str) -> None:
     with pytest.raises(ProfileError, match=sentence):
         found(text, speeds)

@@ -54,7 +54,7 @@ def test_a_page_from_elsewhere_is_refused(origin: str, method: str) -> None:
 
 
 @pytest.mark.parametrize(("method", "answer"), [("GET", 200), ("HEAD", 200), ("POST", 403), ("DELETE", 403), ("WEBSOCKET", 403)])
-def test_only_reading_may_leave_out_whose_page_it_is(method: str, answer: int) -> None:
+def test_only_read_requests_may_omit_the_origin(method: str, answer: int) -> None:
     assert status(method=method) == answer
     assert status(method=method, origin=OWN) == 200
 
@@ -66,7 +66,7 @@ def test_a_page_under_one_name_may_not_ask_under_the_other() -> None:
 @pytest.mark.parametrize(
     "path", ["/", "/secre/", "/secrets/", "/Secret/", "//secret/", "/x/secret/", "/s%65cret/", "/\N{SNOWMAN}/"]
 )
-def test_without_the_token_there_is_nothing(path: str) -> None:
+def test_without_the_token_nothing_is_served(path: str) -> None:
     assert status(path=path) == 404
 
 

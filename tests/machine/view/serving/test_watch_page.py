@@ -78,7 +78,7 @@ def test_nothing_else_is_served(watched: Watched, path: str) -> None:
 
 
 @pytest.mark.parametrize("path", ["/", "/state", "/AAAAAAAAAAAAAAAAAAAAAA/", "/AAAAAAAAAAAAAAAAAAAAAA/state", "//state"])
-def test_who_does_not_know_the_token_of_the_address_is_shown_nothing(watched: Watched, path: str) -> None:
+def test_without_the_token_of_the_address_nothing_is_shown(watched: Watched, path: str) -> None:
     answer, content = asked_without_token(watched, path)
     assert (answer.status, content) == (
         404,
@@ -116,14 +116,14 @@ def test_a_button_asks_of_the_print_what_a_key_does(watched: Watched, control: C
         ("pause", "POST", {"Host": "evil.example"}, 403),
     ],
 )
-def test_nothing_else_can_be_ordered_nor_by_another_page(
+def test_only_known_commands_of_the_own_page_are_accepted(
     watched: Watched, control: Control, name: str, method: str, headers: dict[str, str], status: int
 ) -> None:
     assert ordered(watched, name, method, **headers) == status
     assert control.take() is None
 
 
-def test_without_the_token_or_the_origin_of_the_page_nothing_is_ordered(watched: Watched, control: Control) -> None:
+def test_commands_without_token_or_origin_are_refused(watched: Watched, control: Control) -> None:
     own = {"Origin": f"http://127.0.0.1:{port_of(watched)}"}
     assert asked_without_token(watched, "/AAAAAAAAAAAAAAAAAAAAAA/order/pause", "POST", **own)[0].status == 404
     assert asked(watched, "/order/pause", "POST")[0].status == 403
@@ -151,7 +151,9 @@ def test_no_other_page_may_frame_it_or_keep_it(watched: Watched) -> None:
     assert answer.headers["Access-Control-Allow-Origin"] is None
 
 
-def test_who_hangs_up_leaves_the_terminal_alone(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_dropped_connection_does_not_disturb_the_terminal(
+    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("machine.view.serving.watch_page.LAST_WORD_S", 0.0)
     with serve(b"x" * 20_000_000) as running:
         port = port_of(running)
@@ -184,7 +186,7 @@ def test_the_server_ends_with_the_print() -> None:
         pass
 
 
-def test_a_print_that_fails_is_told_as_failed() -> None:
+def test_a_failed_print_is_shown_as_failed() -> None:
     def failing() -> Iterator[Watched]:
         with serve(b"page") as running:
             yield running
@@ -197,13 +199,13 @@ def test_a_print_that_fails_is_told_as_failed() -> None:
     assert json.loads(running.state())["state"] == "failed"
 
 
-def test_a_warning_is_told_as_long_as_the_print_lasts() -> None:
+def test_a_warning_is_shown_as_long_as_the_print_lasts() -> None:
     watched = Watched(b"")
     watched.follow(replace(HALF, warning="this print can no longer be resumed"))
     assert json.loads(watched.state())["warning"] == "this print can no longer be resumed"
 
 
-def test_how_it_ended_is_said_once() -> None:
+def test_the_outcome_is_shown_once() -> None:
     watched = Watched(b"")
     watched.follow(HALF)
     watched.end(PrintState.CANCELLED)
@@ -234,7 +236,7 @@ def test_print_watch_follows_the_print_to_its_end(
 
 
 @pytest.mark.parametrize(("more", "opened_in"), [((), 1), (("--no-browser",), 0)])
-def test_print_watch_opens_the_browser_unless_it_is_told_not_to(
+def test_print_watch_opens_the_browser_unless_disabled(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, more: tuple[str, ...], opened_in: int
 ) -> None:
     monkeypatch.setattr("machine.view.serving.watch_page.LAST_WORD_S", 0.0)

@@ -77,7 +77,7 @@ def test_the_page_of_the_computer_gets_the_address_without_the_code_as_a_picture
     assert told["qr_code"].startswith("data:image/svg+xml;charset=utf-8,%3Csvg")
 
 
-def test_the_code_gives_a_device_a_cookie_of_its_own_and_is_used_up() -> None:
+def test_the_code_gives_a_device_its_own_cookie_and_is_used_up() -> None:
     async def run() -> None:
         network = Network()
         code = network.code
@@ -109,7 +109,7 @@ def test_another_cookie_is_that_of_no_device(cookie: str) -> None:
 
 
 @pytest.mark.parametrize("host", ["evil.example:8123", "127.0.0.1:8123", "localhost:8123", "192.168.1.5", "192.168.1.5:80", ""])
-def test_under_another_name_nobody_is_answered_paired_or_not(host: str) -> None:
+def test_requests_for_another_host_name_are_refused_even_from_paired_devices(host: str) -> None:
     async def run() -> None:
         network = Network()
         async with network.device() as phone:
@@ -121,7 +121,7 @@ def test_under_another_name_nobody_is_answered_paired_or_not(host: str) -> None:
 
 
 @pytest.mark.parametrize("name", ["192.168.1.5", "workshop", "workshop.local", "WORKSHOP.local"])
-def test_the_computer_is_asked_for_by_its_address_or_name(name: str) -> None:
+def test_requests_may_name_the_computer_by_address_or_name(name: str) -> None:
     async def run() -> None:
         async with Network().device(f"http://{name}:{PORT}") as device:
             assert (await device.get("/")).status_code == 200
@@ -143,7 +143,7 @@ def test_a_page_from_elsewhere_can_neither_pair_nor_use_up_codes(origin: str | N
     asyncio.run(run())
 
 
-def test_a_hundred_codes_at_once_pair_nobody_and_close_pairing_while_paired_devices_go_on() -> None:
+def test_a_hundred_codes_at_once_pair_no_device_close_pairing_and_leave_paired_devices() -> None:
     async def run() -> None:
         network = Network()
         async with network.device() as phone, network.device() as thief:
@@ -167,7 +167,7 @@ def test_a_hundred_codes_at_once_pair_nobody_and_close_pairing_while_paired_devi
     asyncio.run(run())
 
 
-def test_waiting_is_told_on_the_page_and_in_the_terminal_and_the_right_code_waits_too() -> None:
+def test_the_wait_is_shown_on_the_page_and_in_the_terminal_and_holds_for_the_right_code() -> None:
     async def run() -> None:
         network = Network()
         async with network.device() as device:
@@ -187,7 +187,7 @@ def test_waiting_is_told_on_the_page_and_in_the_terminal_and_the_right_code_wait
 
 
 @pytest.mark.parametrize("body", [b"", b"code", b"other=x", b"\xff\xfe=", b"code=" + b"A" * 10_000, b"code=%FF%00"])
-def test_what_is_no_code_is_refused(body: bytes) -> None:
+def test_an_invalid_code_is_refused(body: bytes) -> None:
     async def run() -> None:
         async with Network().device() as device:
             answer = await device.post("/pair", content=body, headers={"origin": OWN})

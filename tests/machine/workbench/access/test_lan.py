@@ -53,24 +53,26 @@ def test_the_addresses_are_those_of_private_networks() -> None:
         ("127.0.1.1", False),
     ],
 )
-def test_none_is_taken_that_the_internet_reaches(monkeypatch: pytest.MonkeyPatch, address: str, private: bool) -> None:
+def test_no_address_reachable_from_the_internet_is_used(monkeypatch: pytest.MonkeyPatch, address: str, private: bool) -> None:
     monkeypatch.setattr(socket, "gethostbyname_ex", lambda name: (name, [], [address]))
     assert (address in network_addresses()) == private
 
 
-def test_without_an_address_it_is_not_opened(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_without_a_network_address_the_workbench_is_not_opened_to_the_network(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(lan, "network_addresses", lambda: ())
     assert main(["edit", "--lan", "--no-browser"]) == 1
     assert "--lan: this computer has no address in a private network: join one, or leave --lan out" in capsys.readouterr().err
 
 
-def test_what_a_browser_may_call_it() -> None:
+def test_the_host_names_that_a_browser_may_use() -> None:
     assert Lan(("10.0.0.2",), ("pi", "pi.local")).hosts(8123) == ("10.0.0.2:8123", "pi:8123", "pi.local:8123")
     assert Lan(("10.0.0.2",)).hosts(80) == ("10.0.0.2:80", "10.0.0.2")
     assert Lan(("10.0.0.2",), (), Certificate(Path("a"), Path("b"))).urls(8123) == ("https://10.0.0.2:8123/",)
 
 
-def test_one_port_is_had_at_all_addresses_or_at_none() -> None:
+def test_a_port_is_opened_at_all_addresses_or_at_none() -> None:
     own, others = listen_at_all(0, ("127.0.0.2", "127.0.0.3"))
     port = own.getsockname()[1]
     with own, others[0], others[1]:
@@ -105,7 +107,7 @@ def test_a_certificate_and_its_key_are_taken(certificates: Path, network: None) 
         ("a.key", "a.pem", "--certificate a.key and --key a.pem cannot be used: both must be PEM files"),
     ],
 )
-def test_other_files_are_told_in_one_sentence(
+def test_files_that_are_not_certificates_are_refused_in_one_sentence(
     chain: str | None,
     key: str | None,
     sentence: str,
@@ -123,6 +125,6 @@ def test_other_files_are_told_in_one_sentence(
     assert told.out == ""
 
 
-def test_a_certificate_without_a_network_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_certificate_without_a_network_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["edit", "--certificate", "a.pem", "--key", "a.key"]) == 1
     assert "--certificate and --key need --lan: add it" in capsys.readouterr().err

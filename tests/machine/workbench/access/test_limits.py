@@ -33,7 +33,7 @@ def test_other_commands_of_a_bench_are_done(asked: dict[str, Any]) -> None:
         ({"do": "go_on", "port": "sim", "journal": "/state/a.journal", "machine": "/home/me/x.toml"}, ProfileError),
     ],
 )
-def test_ports_and_files_that_nobody_here_has_named_are_refused(asked: dict[str, Any], error: type[UserError]) -> None:
+def test_ports_and_files_not_named_at_the_computer_are_refused(asked: dict[str, Any], error: type[UserError]) -> None:
     with pytest.raises(error, match="a paired device"):
         check_print_command(asked, PORTS, JOURNALS)
 
@@ -48,7 +48,7 @@ def test_ports_and_files_that_nobody_here_has_named_are_refused(asked: dict[str,
         {"do": "cancel", "print": 1},
     ],
 )
-def test_what_was_found_here_may_be_chosen_and_every_print_stopped(asked: dict[str, Any]) -> None:
+def test_a_device_may_choose_printers_found_here_and_stop_every_print(asked: dict[str, Any]) -> None:
     check_print_command(asked, PORTS, JOURNALS)
 
 
@@ -60,7 +60,7 @@ def test_models_that_may_name_other_files_are_not_taken(name: str) -> None:
 
 
 @pytest.mark.parametrize("parent", ['"/etc/hostname"', '"../own.toml"', '"pla"', "3"])
-def test_a_profile_inherits_from_no_file_and_from_none_of_another_kind(tmp_path: Path, parent: str) -> None:
+def test_a_profile_from_a_device_inherits_from_no_file_and_no_other_kind(tmp_path: Path, parent: str) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(f"inherits = {parent}\n[process]\nwalls = 3\n")
     with pytest.raises(ProfileError, match=r"mine\.toml: the profile of a paired device inherits one that is known here"):
@@ -70,7 +70,7 @@ def test_a_profile_inherits_from_no_file_and_from_none_of_another_kind(tmp_path:
 @pytest.mark.parametrize(
     "text", ['inherits = "standard"\n[process]\nwalls = 3\n', "[process]\nwalls = 3\n", "no toml", "plan = 1\n"]
 )
-def test_other_profiles_and_what_is_none_go_on_to_be_read(tmp_path: Path, text: str) -> None:
+def test_other_profiles_and_invalid_files_are_passed_on_to_the_reader(tmp_path: Path, text: str) -> None:
     file = tmp_path / "mine.toml"
     file.write_text(text)
     check_profile(file)

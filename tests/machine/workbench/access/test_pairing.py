@@ -31,7 +31,7 @@ def test_the_code_pairs_as_people_type_it_and_is_used_up(typed: str) -> None:
 
 
 @pytest.mark.parametrize("typed", ["", "ABCD234", "ABCD23456", "ABCD2346", "\N{SNOWMAN}", "ＡBCD2345"])
-def test_what_is_not_the_code_does_not_pair(typed: str) -> None:
+def test_a_wrong_code_does_not_pair(typed: str) -> None:
     assert judge(OPEN, typed, 0.0, NEXT)[1] == Verdict.WRONG
 
 
@@ -43,7 +43,7 @@ def test_five_wrong_codes_replace_it_and_pairing_waits_longer_each_time() -> Non
     assert after_wrong(15)[0].waits_until_s == 30.0 + 60.0 + 120.0
 
 
-def test_while_it_waits_the_right_code_is_not_looked_at_and_no_wrong_one_counted() -> None:
+def test_during_a_wait_the_right_code_is_ignored_and_no_wrong_one_counted() -> None:
     pairing, _ = after_wrong(5)
     assert judge(pairing, CODE, 29.9, NEXT) == (pairing, Verdict.WAITS)
     assert judge(pairing, "no", 29.9, NEXT) == (pairing, Verdict.WAITS)
@@ -63,7 +63,7 @@ def test_a_device_that_pairs_in_between_does_not_forget_what_was_counted() -> No
 
 
 @given(st.lists(st.tuples(st.booleans(), st.floats(0.0, 100.0)), max_size=120))
-def test_whoever_does_not_know_the_code_never_types_more_than_twenty_that_are_looked_at(tries: list[tuple[bool, float]]) -> None:
+def test_at_most_twenty_wrong_codes_are_ever_checked(tries: list[tuple[bool, float]]) -> None:
     pairing, now_s, looked_at = OPEN, 0.0, 0
     for knows, passed_s in tries:
         now_s += passed_s
@@ -74,7 +74,7 @@ def test_whoever_does_not_know_the_code_never_types_more_than_twenty_that_are_lo
         pairing = after
 
 
-def test_codes_are_random_and_without_letters_that_look_alike() -> None:
+def test_codes_are_random_and_have_no_ambiguous_letters() -> None:
     codes = {fresh_code() for _ in range(200)}
     assert len(codes) == 200
     assert set("".join(codes)) <= set(LETTERS)
@@ -82,7 +82,7 @@ def test_codes_are_random_and_without_letters_that_look_alike() -> None:
     assert grouped("ABCD2345") == "ABCD-2345"
 
 
-def test_a_state_that_is_printed_does_not_tell_its_code() -> None:
+def test_the_representation_of_the_state_does_not_contain_the_code() -> None:
     assert CODE not in repr(OPEN)
 
 

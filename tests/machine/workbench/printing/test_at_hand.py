@@ -79,14 +79,14 @@ def test_a_printer_is_heated_homed_and_moved_and_its_heaters_go_off_when_it_is_l
     assert told.state["end"] == End(PrintState.DONE, "disconnected; the heaters are off")
 
 
-def test_the_emergency_stop_halts_a_printer_in_hand() -> None:
+def test_the_emergency_stop_halts_a_printer_under_manual_control() -> None:
     with in_hand() as (person, told):
         person.hear(Command.EMERGENCY_STOP)
         wait_until(lambda: "end" in told.state)
     assert told.state["end"].sentence.startswith("emergency stop: the printer has halted")
 
 
-def test_nothing_is_homed_or_moved_over_a_table_that_is_tilted_or_of_which_nothing_is_known() -> None:
+def test_nothing_is_homed_or_moved_over_a_tilted_or_unknown_table() -> None:
     check_level(MACHINE, {"A": 0.0, "C": 90.0}, homing=False)
     with pytest.raises(MoveError, match=r"the table is tilted, at A30.00: nothing is homed or moved before it is level"):
         check_level(MACHINE, {"A": 30.0, "C": 0.0}, homing=True)
@@ -107,6 +107,6 @@ def test_homing_is_what_the_start_block_does_without_its_heat() -> None:
 
 
 @pytest.mark.parametrize(("axis", "by_mm"), [("Z", -100.0), ("A", 1.0), ("X", 1000.0), ("X", float("nan"))])
-def test_a_jog_leaves_neither_the_limits_nor_goes_below_the_table(axis: str, by_mm: float) -> None:
+def test_a_jog_stays_within_the_limits_and_above_the_table(axis: str, by_mm: float) -> None:
     with pytest.raises(MoveError):
         jog_target_mm(MACHINE, {"X": 0.0, "Y": 0.0, "Z": 10.0}, axis, by_mm)

@@ -69,7 +69,7 @@ def refusal(given: Any, port: str, **further: Any) -> UserError:
     return refused.value
 
 
-def test_errors_that_slicing_has_found_are_refused_before_the_printer_is_asked_in_the_sentence_of_print() -> None:
+def test_errors_known_from_slicing_are_refused_before_the_printer_is_contacted() -> None:
     sentence = str(refusal(session(BAD), "/dev/no-such-port"))
     silent: Any = Silent()
     load = Slices("box.stl", file(BAD), PROFILE)
@@ -86,9 +86,7 @@ def test_errors_that_slicing_has_found_are_refused_before_the_printer_is_asked_i
     ("generic_ac", "/dev/no-such-port", {"baud": 7}, "baud rate 7 is not possible: "),
     ("generic_ac", "sim", {"speed": -1.0}, "--sim-speed is -1: "),
 ])  # fmt: skip
-def test_what_the_machine_and_the_port_decide_is_refused_first(
-    machine: str, port: str, further: dict[str, Any], sentence: str
-) -> None:
+def test_conflicts_of_machine_and_port_are_refused_first(machine: str, port: str, further: dict[str, Any], sentence: str) -> None:
     refused = refusal(session(BAD, load(machine)), port, **further)
     assert isinstance(refused, PrinterError)
     assert sentence in str(refused)
@@ -107,7 +105,7 @@ def program(lines: list[str], profile: Profile, known: KnownFindings | None) -> 
     return Slices("box.stl", file(lines), profile, known)().program.run.findings
 
 
-def test_what_is_known_of_the_very_lines_for_the_very_profile_is_not_looked_for_again() -> None:
+def test_findings_of_the_same_lines_and_profile_are_not_computed_again() -> None:
     known = known_findings(GOOD, PROFILE, [OTHER])
     assert program(GOOD, PROFILE, known) == (OTHER,)
     slices = Slices("box.stl", file(GOOD), PROFILE, known)
@@ -122,13 +120,13 @@ def test_what_is_known_of_the_very_lines_for_the_very_profile_is_not_looked_for_
     (GOOD[1:], PROFILE),
     (GOOD, load(settings=["machine.nozzle_limit_c=290"])),
 ])  # fmt: skip
-def test_what_differs_by_a_byte_or_a_setting_is_dry_run_anew(lines: list[str], profile: Profile) -> None:
+def test_a_difference_of_a_byte_or_a_setting_causes_another_dry_run(lines: list[str], profile: Profile) -> None:
     findings = program(lines, profile, known_findings(GOOD, PROFILE, [OTHER]))
     assert findings == dry_run(lines, profile).findings
     assert OTHER not in findings
 
 
-def test_a_line_that_would_be_two_when_the_text_is_read_again_is_dry_run_anew() -> None:
+def test_a_line_that_would_be_read_again_as_two_causes_another_dry_run() -> None:
     in_one = [*GOOD[:-2], "\n".join(GOOD[-2:])]
     assert file(in_one) == file(GOOD)
     assert OTHER not in program(GOOD, PROFILE, known_findings(in_one, PROFILE, [OTHER]))
@@ -154,7 +152,7 @@ def test_the_printer_of_last_time_is_known_at_the_next_start(at: Destination) ->
     '{"port": 1, "baud": "x", "sim_speed": 0}', '{"port": "/dev/ttyS0", "baud": 7, "sim_speed": 0}',
     '{"port": "/dev/ttyS0", "baud": Infinity, "sim_speed": 0}',
 ])  # fmt: skip
-def test_a_file_that_names_no_printer_is_as_none(text: str) -> None:
+def test_a_stored_destination_without_a_printer_is_ignored(text: str) -> None:
     (state_folder() / FILE).write_text(text)
     assert last_printer() is None
 
@@ -173,14 +171,14 @@ def test_a_print_that_is_over_keeps_its_last_moment_in_the_state_in_which_it_end
     )
 
 
-def test_a_warning_stands_beside_the_state_and_is_read_aloud() -> None:
+def test_a_warning_is_shown_beside_the_state_and_read_aloud() -> None:
     lost = "this print can no longer be resumed"
     told = JobState(PrintStatus(PrintState.PRINTING, share=0.5, warning=lost), live=True, name="box").json()
     assert told["how"] == f"printing, 50 % · {lost}"
     assert told["texts"]["run-news"] == f"box: printing: {lost}"
 
 
-def test_progress_before_a_print_is_told_only_while_it_lasts() -> None:
+def test_progress_before_a_print_is_shown_only_while_it_lasts() -> None:
     told: list[tuple[str, ...]] = []
     person = AtPage(SimpleNamespace(tell=lambda said: told.append(said)))
     person.hear_notice(Notice("the printer answers\n"))

@@ -149,7 +149,7 @@ CANCELLED = r"the print was cancelled after \d+ lines; heaters off"
     (break_off, CANCELLED),
     (cannot_be_told, f"a bug in tiltprint: .*; {DIED}; the printer reports its heaters off"),
 ])  # fmt: skip
-def test_whoever_dies_the_heaters_go_off(
+def test_the_heaters_are_switched_off_whichever_process_dies(
     end: Callable[[Prints, RunningPrint], None], expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(running_print, "EMERGENCY_S", 0.2)
@@ -169,7 +169,7 @@ GOES_ON = "is printing hour.gcode and continues without this program: control it
     (kill, f"{DIED}; {{address}} {GOES_ON}"),
     (hang_up, "hour keeps printing on {address}: this page no longer follows it"),
 ])  # fmt: skip
-def test_whoever_dies_a_print_server_goes_on_and_its_key_is_told_nowhere(
+def test_a_print_server_continues_whichever_process_dies_and_its_key_is_never_shown(
     end: Callable[[Prints, RunningPrint], None], expected: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(VARIABLE, KEY)
@@ -240,7 +240,7 @@ for state in (PrintState.PRINTING, PrintState.LEFT):
     ("octoprint", RunningPrint.stop_at_once, "emergency stop: {0} has taken it; ", True, "printing"),
     ("duet", RunningPrint.cancel, "the print was cancelled on {0}", False, "cancelled"),
 ])  # fmt: skip
-def test_a_stop_or_a_cancel_as_a_print_is_left_is_given_on_a_connection_of_its_own(
+def test_a_stop_or_cancel_of_a_print_being_left_uses_its_own_connection(
     waits_for: str,
     kind: str,
     give: Callable[[RunningPrint], None],
@@ -293,7 +293,7 @@ class Heard:
     (order("sim", "G28\nG1 X500 F600\n", force=False), "the dry run found 1 error, the first: X goes to 500 mm", True),
     (order("sim", file=Path("gone.gcode")), "these slices no longer exist: slice what is to be printed", False),
 ])  # fmt: skip
-def test_what_print_refuses_is_refused_with_its_sentence(wanted: PrintJob, sentence: str, forcible: bool) -> None:
+def test_a_job_that_print_refuses_is_refused_with_the_same_sentence(wanted: PrintJob, sentence: str, forcible: bool) -> None:
     heard = Heard()
     end, goes_on = carry_out(wanted, AtPage(heard))  # type: ignore[arg-type]
     assert terminal_words(end.sentence).startswith(sentence)
@@ -314,7 +314,7 @@ def test_an_incomplete_journal_is_refused_at_the_page_with_the_sentence_of_resum
     )
 
 
-def test_the_page_is_told_at_once_that_a_print_can_no_longer_be_resumed_and_names_no_journal_any_more(tmp_path: Path) -> None:
+def test_the_page_reports_at_once_that_a_print_can_no_longer_be_resumed(tmp_path: Path) -> None:
     heard, log = Heard(), SerialLog(tmp_path / "log", "p")
     person = AtPage(heard)  # type: ignore[arg-type]
     with (
@@ -329,7 +329,7 @@ def test_the_page_is_told_at_once_that_a_print_can_no_longer_be_resumed_and_name
     assert (heard.state["journal"], heard.state["status"].warning) == ("", "this print can no longer be resumed")
 
 
-def test_an_upload_is_no_moment_of_a_print_and_what_a_server_tells_besides_is_no_end_of_one(tmp_path: Path) -> None:
+def test_an_upload_is_not_a_print_and_other_server_messages_do_not_end_one(tmp_path: Path) -> None:
     heard, log = Heard(), SerialLog(tmp_path / "log", "p")
     person, told = AtPage(heard), list[tuple[str, bool, str]]()  # type: ignore[arg-type]
     moments = [(True, PrintState.UPLOADING), (False, PrintState.PAUSED), (False, PrintState.READY), (False, PrintState.DONE)]
@@ -349,7 +349,7 @@ def test_an_upload_is_no_moment_of_a_print_and_what_a_server_tells_besides_is_no
 
 
 @pytest.mark.parametrize(("kind", "profile"), [("octoprint", PROFILE), ("duet", load("gen5x"))])
-def test_a_file_that_is_only_to_be_kept_is_handed_over_while_its_server_prints_another(
+def test_a_file_can_be_uploaded_while_its_server_prints_another(
     kind: str, profile: Profile, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(VARIABLE, KEY)
@@ -393,7 +393,7 @@ class Attended:
         return self.heard.state
 
 
-def test_a_person_at_a_page_commands_a_print_on_a_duet(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_user_controls_a_print_on_a_duet_from_the_page(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv(VARIABLE, KEY)
     monkeypatch.setattr(follow, "POLL_S", 0.05)
     stopped = "emergency stop: {0} has taken it; restart the printer before the next print; nozzle 210 °C, bed 60 °C as last"
@@ -432,14 +432,14 @@ def test_a_print_whose_server_dies_at_any_byte_of_a_command_is_left() -> None:
         assert person.ask("") is None
 
 
-def test_a_stop_that_nobody_takes_any_more_has_stopped_nothing() -> None:
+def test_a_stop_after_the_end_of_a_print_reports_that_nothing_was_stopped() -> None:
     person = AtPage(Heard())  # type: ignore[arg-type]
     assert not person.has_stopped()
     person.hear(Command.EMERGENCY_STOP)
     assert not person.has_stopped()
 
 
-def test_what_force_goes_past_stands_in_place_of_what_a_check_would_show() -> None:
+def test_an_objection_overridden_by_force_is_shown_in_place_of_its_check() -> None:
     heard = Heard()
     person = AtPage(heard)  # type: ignore[arg-type]
     with notices_to(FrontEnd(person.hear_notice)):
@@ -489,13 +489,15 @@ def test_a_speed_that_is_no_number_is_refused(percent: object) -> None:
     ({"do": "by_hand", "print": 1, "does": "jog", "by_mm": 10**400}, "by_mm is 1000"),
     ({"do": "begin", "print": "1"}, "print is .1.: it must be a whole number"),
 ])  # fmt: skip
-def test_what_has_another_type_than_a_command_takes_is_refused(asked: dict[str, Any], said: str) -> None:
+def test_an_argument_of_a_wrong_type_is_refused(asked: dict[str, Any], said: str) -> None:
     with pytest.raises(PlanError, match=said):
         obey(page_of(prints_with_one()), asked)
 
 
 @pytest.mark.parametrize("number", [{}, {"print": None}, {"print": "all"}, {"print": {"number": 1}}, {"print": 7, "more": [1]}])
-def test_an_emergency_stop_is_given_whatever_else_a_page_sends(number: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_emergency_stop_is_executed_whatever_else_a_page_sends(
+    number: dict[str, Any], monkeypatch: pytest.MonkeyPatch
+) -> None:
     stopped: list[int] = []
     monkeypatch.setattr(RunningPrint, "stop_at_once", lambda current: stopped.append(current.number))
     obey(page_of(prints_with_one(), "other"), {"do": "emergency", **number})
@@ -529,7 +531,7 @@ def test_only_the_page_that_commands_a_print_may_say_anything_to_it_but_to_stop_
     ("forget", "sim", "printing", False), ("forget", "sim", "done", True), ("dance", "sim", "printing", False),
     (["take"], "sim", "printing", False),
 ])  # fmt: skip
-def test_what_cannot_be_asked_of_a_print_is_refused(name: Any, port: str, state: str, allowed: bool) -> None:
+def test_a_command_that_a_print_cannot_execute_is_refused(name: Any, port: str, state: str, allowed: bool) -> None:
     prints = prints_with_one(port)
     enter(prints.prints[0], state)
     with (
@@ -541,14 +543,14 @@ def test_what_cannot_be_asked_of_a_print_is_refused(name: Any, port: str, state:
     assert bool(prints.prints) == (name != "forget" or not allowed)
 
 
-def test_an_emergency_stop_goes_before_all_that_was_asked_earlier() -> None:
+def test_an_emergency_stop_overtakes_all_earlier_commands() -> None:
     control = Control()
     control.ask(Command.PAUSE)
     control.ask(Command.EMERGENCY_STOP)
     assert [asked.command for asked in iter(control.take, None)] == [Command.EMERGENCY_STOP, Command.PAUSE]
 
 
-def test_a_print_that_is_begun_twice_is_begun_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_print_requested_twice_begins_once(monkeypatch: pytest.MonkeyPatch) -> None:
     said: list[object] = []
     monkeypatch.setattr(RunningPrint, "say", lambda current, value: said.append(value))
     current = RunningPrint(1, order("sim"), "me", lambda: None)
@@ -579,7 +581,7 @@ def test_a_stop_that_is_pressed_twice_stops_no_other_print(monkeypatch: pytest.M
     asyncio.run(run())
 
 
-def test_what_runs_stays_in_the_list_to_be_stopped_and_of_what_is_over_the_newest_five(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_list_has_all_running_prints_and_the_newest_five_that_are_over(monkeypatch: pytest.MonkeyPatch) -> None:
     stopped: list[int] = []
     monkeypatch.setattr(RunningPrint, "stop_at_once", lambda current: stopped.append(current.number))
 
@@ -601,7 +603,7 @@ def test_what_runs_stays_in_the_list_to_be_stopped_and_of_what_is_over_the_newes
     asyncio.run(run())
 
 
-def test_a_past_print_goes_to_pages_as_texts_with_dashes_for_what_is_unknown() -> None:
+def test_a_past_print_is_shown_as_texts_with_dashes_for_unknown_values() -> None:
     done = {"name": "box", "outcome": "done", "begun": 7.0, "seconds": 5400.0, "filament_m": 1.25}
     assert past_row(done) == {"cells": ["box", "done", "1h 30m", "1.2 m"], "begun": 7.0}
     assert past_row({**done, "seconds": None, "filament_m": None})["cells"] == ["box", "done", "–", "–"]

@@ -26,6 +26,7 @@ export function modelPanel() {
   }
   onData("turn", ({ turn: axis, deg }) => send({ do: "turn", axis, deg: Number(deg) }));
   listen("click", { "as-read": () => send({ do: "stand", rotation: [[1, 0, 0], [0, 1, 0], [0, 0, 1]] }) });
+  onState(({ undo, parts }, before) => { if (before && undo !== before.undo && undo.startsWith("open ") && parts > 1 && store.tab === "model") $("tab-parts").click(); });
   dropping();
   offer("left");
   onNew(({ rotation }) => rotation, () => TURNS.forEach((axis) => { $(`turn-${axis}`).value = $(`turn-${axis}-typed`).value = 0; }));

@@ -70,9 +70,10 @@ function look(picture, red) {
 export function bodiesOf(picture) {
   for (const name of ["pedestal", "others"]) {
     const take = (body, of) => {
+      const grown = name === "others" && body?.count > (store.others?.body.count || 0); // a model was added
       update({ [name]: body && { of, body } });
       document.documentElement.dataset[name] = body ? of : "";
-      if (store.state.misplaced) picture.fit();
+      if (store.state.misplaced || grown) picture.fit();
     };
     const fetchBody = newest({ read: async (answer) => trianglesFrom(await answer.arrayBuffer()), take, insists: true });
     onState(({ [name]: key }) => { if (key !== null) fetchBody(key, `${name}/${key}`); }); // null: not known yet
@@ -137,7 +138,7 @@ export function thumbnailsOf(picture) {
     const held = $("resting").contains(document.activeElement); // the pressed button was focused, so focus the current one
     $("resting").replaceChildren(...resting.map(({ rotation, words, overhang_mm2: area, present }) => {
       const lay = () => { update({ clicks: "" }); send({ do: "stand", rotation }); };
-      return button("", lay, { ariaPressed: String(present) }, drawn ? thumbnail(rotation) : "", made("span", { text: words }), made("small", { text: mm2(area) }));
+      return button("", lay, { ariaPressed: String(present) }, drawn ? thumbnail(rotation) : "", made("span", { text: words }), made("small", { text: `${mm2(area)} overhanging` }));
     }));
     if (held) $("resting").querySelector("[aria-pressed=true]")?.focus();
     hide({ laid: !views.length });

@@ -71,7 +71,8 @@ const noteOf = ({ text, parts }) => made("li", {}, text, ...(parts ? [button(`Ch
 function tellRow(row) {
   const { front, recommended, parts, cuts, priced, by_hand: own } = store.state;
   const byHand = front.length > 0 && row.parts === parts && !alike(row.planes, cuts), best = row.parts === recommended;
-  const figures = byHand ? own?.figures || front[0].figures.map(([name]) => [name, ""]) : row.figures, unknown = byHand && !own ? "…" : priced ? "–" : "computing …";
+  const figures = own && row.parts === parts ? own.figures : byHand ? front[0].figures.map(([name]) => [name, ""]) : row.figures;
+  const unknown = !priced ? "computing …" : (byHand || row.parts === parts) && !own ? "…" : "–";
   $("front").setAttribute("aria-valuetext", partsInWords(row.parts) + (best ? ", recommended" : ""));
   $("recommended").disabled = best && !byHand;
   tellIn("front-told", [

@@ -34,7 +34,10 @@ export const figuresNow = () => {
 };
 
 /** Select a part and its plane, if any; 0: none. */
-export const choosePart = (part) => update({ part: part <= store.state.parts ? part : 0, hand: null });
+export function choosePart(part) {
+  if (store.state.refused && part !== store.part) send({ do: "dismiss" }); // it was about another part
+  update({ part: part <= store.state.parts ? part : 0, hand: null });
+}
 
 /** The part at a point of the build plate's frame. */
 export const partAt = (place) => planesNow().reduce((part, plane, k) => (dot(plane.normal, place) > plane.offset_mm ? k + 2 : part), 1);
@@ -248,7 +251,7 @@ function tellAll() {
   $("plane-told").className = why ? "refused" : invalid && "invalid";
   const told = why ? why : invalid && !store.hand ? `Cannot be cut off here: ${invalid}.` : !figures || !cuts.length ? ""
     : `${mm2(figures.support_area_mm2)} to support, ${figures.seam_mm.toFixed(0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
-  tell({ "plane-told": told, "plane-name": `Part ${part}`, unsliceable: unsliceable ? `Cannot be sliced: ${unsliceable}.` : "" });
+  tell({ "plane-told": told, "plane-name": `Part ${part}`, "plane-of": `Plane of part ${part}`, unsliceable: unsliceable ? `Cannot be sliced: ${unsliceable}.` : "" });
 }
 
 const PLACE_SHARE = 0.02; // share of the model's diagonal: size of a marker

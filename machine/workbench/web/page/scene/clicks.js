@@ -81,11 +81,8 @@ export function handsOf(camera, picture) {
 /** The number of the other model whose box is under an event, counted from 1; 0: none, or the model in work is there. */
 function otherMet(event, picture) {
   const { other_boxes: boxes, copies_mm: copies } = store.state, [from, along] = picture.sight(event), start = copies && add(from, [...copies[0], 0]);
-  const best = boxes.reduce((nearest, [number, [low, high]]) => {
-    const far = boxMet(low, high, start, along);
-    return far < nearest.far ? { number: number + 1, far } : nearest;
-  }, { number: 0, far: Infinity });
-  return best.number && !met(event, picture) ? best.number : 0;
+  const [, number] = boxes.map(([k, [low, high]]) => [boxMet(low, high, start, along), k + 1]).reduce((best, other) => (other[0] < best[0] ? other : best), [Infinity, 0]);
+  return number && !met(event, picture) ? number : 0;
 }
 
 /** The active tool uses a click on the model; without a tool it selects a part, or another model to work on, or nothing beside them. */

@@ -106,10 +106,7 @@ export function pictureOf(canvas, camera) {
     document.documentElement.dataset.drawn = ++count;
   };
   const ask = nextFrame(draw);
-  const anew = (name, coloursAlone = false) => {
-    stale.set(name, coloursAlone && (stale.get(name) ?? true));
-    ask();
-  };
+  const anew = (name, coloursAlone = false) => { stale.set(name, coloursAlone && (stale.get(name) ?? true)); ask(); };
   /** Set a value of the scene and rebuild its drawing. */
   const take = (key, name = key, coloursAlone = false) => (value) => {
     if (value === scene[key]) return;
