@@ -132,19 +132,13 @@ def check_parts_possible(request: ModelRequest, given: PlanFile | None, profile:
     """Raise ProfileError or SliceError before the search for settings or stops of parts that it cannot make."""
     planes = () if given is None else given.row(request.parts) if request.plan and request.parts else given.parts
     most = len(planes) + 1 if request.plan else max(len(planes) + 1, request.parts or profile.search.most_parts)
-    for settings in profile.parts:
-        if settings.part > most:
-            there = parts_in_words(most, at_most=not request.plan)
-            raise ProfileError(f"{option('part', settings.part)}: there is no part {settings.part}, {there}")
+    check_parts_named(profile, most, at_most=True)
     check_stop_parts(request.stops, most, at_most=True)
 
 
-def with_parts_found(profile: Profile, parts: int) -> tuple[Profile, list[str]]:
-    """The profile without settings of parts that a search has not made, and a warning for each of them: only the search could
-    show that they do not exist, and its result is worth more than a refusal."""
-    absent = [settings.part for settings in profile.parts if settings.part > parts]
-    if not absent:
-        return profile, []
-    there = parts_in_words(parts)
-    warnings = [f"{option('part', part)}: there is no part {part}, {there}; its settings are left out" for part in absent]
-    return with_part_settings(profile.of_all_parts, [own for own in profile.parts if own.part <= parts]), warnings
+def check_parts_named(profile: Profile, parts: int, at_most: bool = False) -> None:
+    """Raise ProfileError for settings of parts that do not exist. at_most: `parts` is the most there can be."""
+    for settings in profile.parts:
+        if settings.part > parts:
+            there = parts_in_words(parts, at_most)
+            raise ProfileError(f"{option('part', settings.part)}: there is no part {settings.part}, {there}")

@@ -18,11 +18,11 @@ from machine.pipeline.choice import as_turned, lays_down, orientation_in_words, 
 from machine.pipeline.given_plan import (
     check_modifiers,
     check_number,
+    check_parts_named,
     check_parts_possible,
     read_given_plan,
     request_of_each,
     with_file_marks,
-    with_parts_found,
     with_plan_of_demo,
     with_plan_settings,
 )
@@ -136,8 +136,8 @@ def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
             decomposition, notes = search(mesh), standing_in_words(mesh, profile)
     if record_file is not None:
         write_bytes(record_file, next(record[0] for searched, record in records if searched is decomposition))
-    profile, absent = with_parts_found(profile, len(decomposition.parts))
-    for note in (*absent, *decomposition.notes, *(decomposition.rejected if request.verbose else ()), *notes):
+    check_parts_named(profile, len(decomposition.parts))
+    for note in (*decomposition.notes, *(decomposition.rejected if request.verbose else ()), *notes):
         say(f"{request.name}: {note}")
     plan = plan_of(decomposition, NO_ZONES if given is None else given.zones, orientation, profile.parts)
     return Decomposed(decomposition, as_turned(profile, orientation), plan, read_s, perf_counter() - began)

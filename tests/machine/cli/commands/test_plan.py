@@ -91,19 +91,6 @@ def test_part_settings_are_kept_in_the_plan_and_change_the_output(folder: Path, 
         assert sentence in capsys.readouterr().err
 
 
-def test_settings_of_a_part_that_the_search_does_not_make_are_left_out_with_a_warning(
-    folder: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    Path("box.stl").write_bytes(stl(shapes.box()))
-    _run("decompose", "box.stl", "--part", "1:infill_density=0.5", "--part", "9:walls=4", "-o", "parts")
-    assert "--part 9: there is no part 9, there is only part 1; its settings are left out" in capsys.readouterr().err
-    plan = Path("parts/plan.toml").read_text()
-    assert ("infill_density = 0.5" in plan, "walls" in plan) == (True, False)
-    _run("export", "box.stl", "--part", "9:walls=4", "-o", "part.gcode")
-    _run("export", "box.stl", "-o", "none.gcode")
-    assert Path("part.gcode").read_bytes() == Path("none.gcode").read_bytes()
-
-
 def test_modifiers_of_a_plan_are_printed_and_kept_in_the_plan(folder: Path) -> None:
     Path("box.stl").write_bytes(stl(shapes.box()))
     Path("insert.stl").write_bytes(stl(shapes.box(8.0, 8.0, 20.0)))
