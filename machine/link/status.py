@@ -16,7 +16,7 @@ from machine.link.protocol.framing import FAR_NUMBER, frame
 from machine.link.shutdown import Orders
 
 LAST_LINE = re.compile(r"Last Line: (\d{1,10})")
-QUESTIONS = ("M400", "M114", "M105")
+QUESTIONS = ("M115", "M400", "M114", "M105")
 TRIES, ANSWER_S = 3, 4.0  # a board that restarts when its port is opened spends two seconds in its boot loader
 STILL_S = 300.0  # a printer that is still executing its queue answers when that is empty
 SAME = 0.01  # mm or deg: rounding of program and firmware
@@ -33,11 +33,15 @@ class PrinterStatus:
     temperature: Temperature = field(default_factory=Temperature)
     greeted: bool = False  # the firmware sent its start-up message: it has just restarted
     fault: str = ""  # its message about an error
+    capabilities: dict[str, bool] = field(default_factory=dict)  # by name, as far as the firmware lists them
 
     def _read(self, event: Event) -> None:
         """Note an event; a board that restarts begins its line numbers again."""
         if event.kind is Kind.FAULT:
             self.fault = event.text.removeprefix("!!").strip()
+        if event.kind is Kind.CAPABILITY:
+            name, _, present = event.text.partition(":")
+            self.capabilities[name] = present == "1"
         if event.kind in (Kind.START, Kind.BANNER):
             self.greeted, self.last_number = True, None if self.last_number is None else 0
 

@@ -2,7 +2,6 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
@@ -89,7 +88,7 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
     for given_both, sentence in clashes:
         if given_both:
             raise PlanError(sentence)
-    file = plan or planes or _plan_of_demo(request)
+    file = plan or planes
     given = None if file is None else read_plan(file)
     if file is not None and given is not None and request.project is not None and (file.parent / RECORD).is_file():
         given = replace(given, name=request.project.name)  # the user has no other file of it
@@ -98,10 +97,12 @@ def read_given_plan(request: ModelRequest) -> PlanFile | None:
     return given
 
 
-def _plan_of_demo(request: ModelRequest) -> Path | None:
-    """The plan shipped with a demo, unless the user wants other parts or another orientation."""
-    otherwise = request.parts is not None or request.orient or request.outputs.record is not None
-    return None if otherwise else plan_beside(request.model)
+def with_plan_of_demo(request: ModelRequest) -> ModelRequest:
+    """The request with the plan shipped with a demo, which cuts it whatever the search settings are, unless the user names a
+    plan or wants other parts, another orientation or a record of a search."""
+    otherwise = request.plans or request.planes or request.parts is not None or request.orient or request.outputs.record
+    plan = None if otherwise else plan_beside(request.model)
+    return request if plan is None else replace(request, plans=(plan,))
 
 
 def with_plan_settings(profile: Profile, given: PlanFile | None) -> Profile:

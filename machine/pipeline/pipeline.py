@@ -23,6 +23,7 @@ from machine.pipeline.given_plan import (
     read_given_plan,
     request_of_each,
     with_file_marks,
+    with_plan_of_demo,
     with_plan_settings,
 )
 from machine.pipeline.output import write_bytes
@@ -99,6 +100,7 @@ def decompose_each(request: ModelRequest, to_build: bool) -> dict[str, Decompose
 
 def _decompose_alone(request: ModelRequest, to_build: bool) -> Decomposed:
     """Decompose one of the models by itself."""
+    request = with_plan_of_demo(request)
     record_file, given = request.outputs.record, read_given_plan(request)
     profile = with_plan_settings(request.profile, given)
     check_parts_possible(request, given, profile)

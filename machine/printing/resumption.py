@@ -145,7 +145,8 @@ def _print_rest(cut_off: Resumption, rest: LoadedProgram, job: PrintJob, person:
                     raise CancelledError
                 point = replace(point, stood_mm=heights[chosen])
                 way = plan_resume(point, status, cut_off.profile)
-            way.check_offset(dialect_of(cut_off.profile.machine).babystep if way.shifts_z else "")
+            shifts_z = way.shifts_z and status.capabilities.get("BABYSTEPPING", True)
+            way.check_offset(dialect_of(cut_off.profile.machine).babystep if shifts_z else "")
             if person.ask(_question(way, point, cut_off.profile)) is None:
                 raise CancelledError
             _hand_over(cut_off, further, way.line - 1)

@@ -845,3 +845,21 @@ def test_the_last_line_is_known_by_a_refusal_or_by_what_is_wanted_next(said: byt
     with on_terminal(answer) as path, open_port(path, 115200) as port:
         seen = status.query_status(port, SERIAL, lambda: None)
     assert seen.last_number == 41
+
+
+def test_a_firmware_built_without_z_offsets_is_refused_while_the_journal_is_untouched(
+    text: GcodeFile, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(commands, "THERE", ())
+    with journal_of(text, "j") as journal:
+        journal.write(Checkpoint(233, 233, 220, 20, z_offset_mm=0.1))
+    mine, further, before = tmp_path / "mine.toml", tmp_path / "further", journal.path.read_bytes()
+    block = "G28 Z\nG28 X Y\nG0 Z{clear_z_mm} F900"
+    mine.write_text(f'inherits = "generic_ac"\n\n[machine.gcode]\nresume = {json.dumps(block)}\n')
+    with SimulatedPrinter(PROFILE.machine) as printer:
+        options = ["--port", printer.path, "--yes", "--machine", str(mine), "--journal", str(further)]
+        assert main(["resume", str(journal.path), *options]) == 1
+        assert not happened(printer.record, "nozzle")
+    assert "a Z offset of +0.1 mm, which this firmware cannot set: nothing was moved" in capsys.readouterr().err
+    assert journal.path.read_bytes() == before
+    assert not further.exists()

@@ -54,6 +54,14 @@ def test_pads_are_on_four_sides_after_quarter_turns_and_a_tilt_of_60(program: Pa
     assert piece.pads[0].ways[0].round(3).tolist() == [0.0, 1.0, 0.0]  # from +X, right is +Y
 
 
+@pytest.mark.parametrize("setting", ["search.seam_mm=0", "search.method=published", "search.most_parts=2"])
+def test_the_piece_is_cut_by_its_plan_whatever_the_search_settings_are(setting: str, tmp_path: Path) -> None:
+    out = tmp_path / "parts.json"
+    assert main(["decompose", "demo:calibration", "--set", setting, "--json", str(out)]) == 0
+    leans = [round(float(np.degrees(np.arccos(part["direction"][2])))) for part in json.loads(out.read_text())["parts"]]
+    assert leans == [0, 60, 60, 60, 60]
+
+
 def test_a_simulated_misaligned_machine_prints_pads_with_the_predicted_offsets(program: ParsedProgram) -> None:
     true = really(GENERIC, {"zero_deg": 0.3, "point_mm": (0.0, 0.2, -12.3)}, {"point_mm": (0.25, -0.1, 0.0)})
     piece = read_piece(program, GENERIC, "piece.gcode")
