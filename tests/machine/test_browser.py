@@ -314,7 +314,7 @@ def test_no_front_is_shown_without_a_choice(page: Browser) -> None:
     assert page.value("document.getElementById('front-field').hidden")
 
 
-def test_a_finding_is_marked_and_a_click_goes_there(page: Browser) -> None:
+def test_a_click_on_the_marker_of_a_finding_jumps_to_its_line(page: Browser) -> None:
     finding = program()[1].run.findings[0]
     put(page, "position", 0)
     page.value(PICTURE)  # markers appear with the first picture
@@ -399,7 +399,7 @@ def test_one_finger_turns_and_two_fingers_zoom(page: Browser) -> None:
     assert len({before, turned, page.value(PICTURE)}) == 3
 
 
-def test_a_click_on_a_bead_goes_to_its_row(page: Browser) -> None:
+def test_a_click_on_a_bead_jumps_to_its_row(page: Browser) -> None:
     put(page, "part", 2)
     put(page, "model", "hide")
     page.click("#fit")
@@ -455,7 +455,7 @@ def test_the_report_holds_every_part_and_is_printed_with_the_picture(page: Brows
     assert page.pdf().startswith(b"%PDF")
 
 
-def test_without_webgl_the_report_is_shown_and_a_sentence_says_why(tmp_path: Path) -> None:
+def test_without_webgl_the_report_and_the_reason_are_shown(tmp_path: Path) -> None:
     profile, printed = program()
     with small_browser("--disable-3d-apis") as blind:
         opened(blind, tmp_path, print_page("post and arm", printed, profile))

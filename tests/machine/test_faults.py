@@ -109,7 +109,7 @@ def test_swapped_parts_are_found(machine: str) -> None:
 
 
 @EVERY
-def test_a_lost_retraction_is_found(machine: str) -> None:
+def test_a_missing_retraction_is_found(machine: str) -> None:
     lines = list(_text(machine))
     turn = [k for k, line in enumerate(lines) if line.startswith(";PART:")][1]
     ends = max(k for k in range(turn) if lines[k] == ";WIPE_END")
@@ -129,7 +129,7 @@ def test_a_shifted_centre_is_found(machine: str) -> None:
 
 
 @EVERY
-def test_a_deleted_heater_off_is_found(machine: str) -> None:
+def test_a_missing_heater_off_command_is_found(machine: str) -> None:
     lines = list(_text(machine))
     off = [k for k, line in enumerate(lines) if re.match(r"(M104 S0|M568 .*S0|M104 P0|M68 E0 Q0|G10 .*S0)\b", line)]
     assert off
@@ -147,7 +147,7 @@ def test_a_flipped_sign_of_the_tilt_is_found(machine: str) -> None:
 
 
 @EVERY
-def test_a_tilt_word_of_the_other_sign_is_found(machine: str) -> None:
+def test_a_tilt_word_with_the_wrong_sign_is_found(machine: str) -> None:
     lines, letter = list(_text(machine)), _planned(machine)[0].machine.tilt.letter
     pose = [m for m in moves_of(_planned(machine)[3]) if isinstance(m, BeginPart)][1].pose
     assert pose != level(_planned(machine)[0].machine)

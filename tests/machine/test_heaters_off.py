@@ -198,7 +198,7 @@ def test_a_start_block_that_cannot_be_filled_in_is_refused_and_nothing_moves(mon
 
 
 @pytest.mark.parametrize("heat", ["M109 S210", "m109s210", "M0109 S210", "M104 I1\nM190 R60", "M141 S40\nM191 S40"])
-def test_homing_by_hand_heats_nothing_and_does_not_wait(heat: str, monkeypatch: MonkeyPatch) -> None:
+def test_manual_homing_neither_heats_nor_waits(heat: str, monkeypatch: MonkeyPatch) -> None:
     gcode = PROFILE.machine.gcode.model_copy(update={"start": f"{heat}\nG28"})
     heated = PROFILE.model_copy(update={"machine": PROFILE.machine.model_copy(update={"gcode": gcode})})
     monkeypatch.setattr(f"{__name__}.PROFILE", heated)

@@ -156,7 +156,7 @@ def test_firefox_changes_settings_of_all_parts_and_of_one(firefox: Firefox) -> N
     put_setting(firefox, "machine.gcode.before_part", "M104 S120")
 
 
-def test_firefox_slices_goes_to_a_finding_and_follows_layers_and_text(firefox: Firefox) -> None:
+def test_firefox_slices_jumps_to_a_finding_and_follows_layers_and_text(firefox: Firefox) -> None:
     firefox.click("#tab-slices")
     firefox.click("#slice")
     firefox.wait(SLICED)

@@ -190,7 +190,7 @@ def test_an_idle_printer_says_wait_every_second_where_it_is_built_to() -> None:
     assert answer(firmware, "", until_s=7.4) == []
 
 
-def test_a_firmware_without_ok_after_resend_says_none() -> None:
+def test_no_ok_follows_a_resend_when_resend_ok_is_off() -> None:
     assert answer(printer(BuildOptions(resend_ok=False)), "N1 G21*0\n") == resend("checksum mismatch", 0)[:2]
 
 
@@ -215,7 +215,7 @@ def test_a_reset_greets_and_restarts_line_numbers_and_positions() -> None:
 
 
 @pytest.mark.parametrize("order", ["M112", "N9 M112*36", "N9 M112*0", "  M112"])
-def test_m112_is_read_from_the_raw_bytes_whatever_number_and_checksum_it_has(order: str) -> None:
+def test_m112_is_read_from_the_raw_bytes_with_any_line_number_or_checksum(order: str) -> None:
     firmware = printer()
     answer(firmware, "G4 S20\n" * 6, until_s=1.0)
     said = answer(firmware, f"\n{order}\n", until_s=1.0)

@@ -148,7 +148,7 @@ def test_reprapfirmware_reports_positions_steps_and_machine_coordinates() -> Non
 @pytest.mark.parametrize(
     ("machine", "greeting"), [(MARLIN, b"start\n"), (RRF, b"RepRapFirmware for"), (KLIPPER, b"// Klipper state")]
 )
-def test_each_family_greets_in_its_own_words(machine, greeting: bytes) -> None:  # type: ignore[no-untyped-def]
+def test_each_firmware_family_sends_its_own_startup_message(machine, greeting: bytes) -> None:  # type: ignore[no-untyped-def]
     firmware = SimulatedFirmware(machine)
     firmware.reset()
     assert Cable(firmware).exchange(b"").startswith(greeting)

@@ -33,5 +33,5 @@ def test_more_than_the_axes_allow_or_nothing_changes_nothing(limits: dict[str, f
     assert _seconds(STROKE, limits) == pytest.approx(2 * sqrt(20 / 1500))
 
 
-def test_a_turn_keeps_the_axis_s_own_acceleration() -> None:
+def test_a_rotary_move_keeps_the_acceleration_of_its_axis() -> None:
     assert _seconds({"C": 30.0, "F": 60000.0}, {"S": 1.0}) == pytest.approx(30 / 60 + 60 / 400)

@@ -83,7 +83,7 @@ def test_a_panel_that_changes_its_width_while_all_is_drawn_leaves_a_picture(
     assert page.complaints == []
 
 
-def test_how_much_is_drawn_stays_between_0_and_100_per_cent_while_the_slider_moves(
+def test_drawing_progress_stays_between_0_and_100_per_cent_while_the_slider_moves(
     browser: Browser, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     changed(monkeypatch, LEAST=1000, PIECE_MS=1, TOLD_MS=-1)

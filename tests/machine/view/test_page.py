@@ -188,7 +188,7 @@ def test_a_model_name_with_markup_is_escaped_everywhere(folder: Path) -> None:
     assert opened(content)[0]["title"] == name
 
 
-def test_export_writes_the_page_of_its_own_file(folder: Path) -> None:
+def test_export_writes_an_html_view_of_the_exported_file(folder: Path) -> None:
     Path("tee.stl").write_bytes(stl(tee()))
     assert main(["export", "tee.stl", *COARSE, "-o", "a.gcode", "--html", "a.html"]) == 0
     header, arrays = opened(Path("a.html").read_bytes())

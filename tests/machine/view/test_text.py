@@ -28,7 +28,7 @@ G1 X25 E0.25
 
 
 @pytest.mark.parametrize("machine", ["generic_ac", "trident_5axis", "linuxcnc_xyzac"])
-def test_the_text_of_our_own_programs_is_in_the_page(machine: str) -> None:
+def test_the_page_contains_the_g_code_of_our_own_programs(machine: str) -> None:
     assert tuple(text_of(*shown(machine))) == example(machine)[1].lines
 
 

@@ -94,7 +94,7 @@ def test_an_autosaved_bench_is_read_as_it_was_written(bench: Bench) -> None:
     assert len(list(folder.iterdir())) == 3  # record, plan, model
 
 
-def test_profiles_that_are_files_are_kept_with_their_names(bench: Bench, tmp_path: Path) -> None:
+def test_profile_files_are_saved_with_their_names(bench: Bench, tmp_path: Path) -> None:
     own = tmp_path / "mine.toml"
     own.write_text('inherits = "pla"\n[material]\nname = "mine"\nbed_c = 55.0\n')
     folder = new_folder()

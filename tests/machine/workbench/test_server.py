@@ -230,7 +230,7 @@ def test_a_plan_that_is_dropped_cuts_the_model_and_one_of_another_model_is_refus
     assert bench.ask("plan.toml")[1] == (folder / "plan.toml").read_bytes()
 
 
-def test_a_plane_is_tried_moved_locked_and_the_others_are_found(bench: Running, folder: Path) -> None:
+def test_a_plane_is_tried_moved_and_locked_and_a_search_finds_the_others(bench: Running, folder: Path) -> None:
     (folder / "tee.stl").write_bytes(stl(tee()))
     arm = {"normal": [1, 0, 0], "offset_mm": 8.0}
     with bench.line() as page:

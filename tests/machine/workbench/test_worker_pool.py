@@ -171,7 +171,7 @@ def test_a_bench_gets_the_process_that_it_had_and_its_end_is_that_of_this_proces
     assert len(started.processes) == 2
 
 
-def test_a_search_that_waits_for_the_processes_of_other_benches_says_so() -> None:
+def test_a_search_that_waits_for_other_benches_reports_that() -> None:
     pools = WorkerPools()
     pools.long = WorkerPool(1)
 

@@ -7,7 +7,7 @@ from inspect import isfunction
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from manifold3d import CrossSection, Manifold
 
@@ -100,11 +100,12 @@ def test_the_union_of_several_is_shapely_s(seed: int) -> None:
 
 @few
 @given(seeds, st.floats(0.05, 2.0))
+@example(seed=230, distance_mm=1.0)  # a cut-off corner is 1.2 % nearer than the distance
 def test_an_offset_is_between_round_offsets_of_its_distance_and_of_the_mitre_limit(seed: int, distance_mm: float) -> None:
     star = ragged(seed)
     area = as_shapely(star)
     wide, narrow = as_shapely(offset(star, distance_mm)), as_shapely(offset(star, -distance_mm))
-    assert wide.buffer(1e-4).covers(area.buffer(0.99 * distance_mm))
+    assert wide.buffer(1e-4).covers(area.buffer(0.98 * distance_mm))
     assert area.buffer(1.01 * MITRE * distance_mm).covers(wide)
     assert area.buffer(-0.98 * distance_mm).buffer(1e-4).covers(narrow)
     assert narrow.buffer(1e-4).covers(area.buffer(-1.01 * MITRE * distance_mm))

@@ -21,7 +21,7 @@ def test_the_chosen_row_is_recommended() -> None:
     decomposition = replace(tee_in_parts(), front=(WHOLE, replace(CUT, chosen=True, reason="for the lowest cost")))
     assert advice(decomposition, PROFILE).splitlines() == [
         "print it      needs support mm²    less  seams mm  stair-stepping mm²  cost mm²   time  filament m",
-        "in one piece              300.0                 0                 125     425.4  1h 2m         4.0",
+        "in one piece                300                 0                 125       425  1h 2m         4.0",
         "in 3 parts                 30.0  90.0 %        80                   6      78.0  1h 0m         3.9",
         "best: print it in 3 parts",
     ]

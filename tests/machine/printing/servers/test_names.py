@@ -156,7 +156,7 @@ def _own_settings(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv(VARIABLE, raising=False)
 
 
-def test_a_key_is_found_by_host_and_port_before_the_host_alone() -> None:
+def test_a_key_for_host_and_port_takes_precedence_over_one_for_the_host() -> None:
     file = write_servers('[servers."octopi"]\nkey = "one"\nca_file = "ca.pem"\n[servers."octopi:5000"]\nkey = "two"\n')
     assert read_credentials(parse_server_address("octoprint:octopi")) == ("one", file.parent / "ca.pem")
     assert read_credentials(parse_server_address("octoprint:octopi:5000")) == ("two", None)

@@ -695,7 +695,7 @@ def test_the_end_of_an_earlier_print_is_not_taken_for_ours(monkeypatch: pytest.M
         follow_unanswered(lambda: PrintStatus(PrintState.DONE, file="other.gcode"))
 
 
-def test_a_server_whose_answer_never_comes_is_lost_too(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_server_that_never_answers_counts_as_lost_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(follow, "LOST_S", 0.1)
     over = threading.Event()
     monkeypatch.setattr(follow, "JOIN_S", 0.01)

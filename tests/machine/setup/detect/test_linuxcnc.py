@@ -74,7 +74,7 @@ def test_kinematics_that_follow_the_table_take_places_on_it() -> None:
     assert found(INI.replace("xyzac-trt-kins", "trivkins")).settings["coordinates"].value == "table"
 
 
-def test_without_identityfirst_m428_would_end_the_following() -> None:
+def test_kinematics_without_identityfirst_are_refused() -> None:
     with pytest.raises(ProfileError, match=r"^mill.ini: \[KINS\] KINEMATICS is 'xyzac-trt-kins' without sparm=identityfirst"):
         found(INI.replace(" sparm=identityfirst", ""))
 

@@ -79,7 +79,7 @@ def test_comments_after_a_line_are_ignored() -> None:
     assert found(noted).axes == found(LOG).axes
 
 
-def test_of_several_extruders_the_first_counts() -> None:
+def test_the_first_of_several_extruders_is_used() -> None:
     log = LOG.replace(" C90.00 E40.00", " C90.00\necho:  M203 T0 E31.00\necho:  M203 T1 E62.00")
     assert found(log).settings["extruder_speed_mm_s"].value == 31.0
 

@@ -104,7 +104,7 @@ def test_an_axis_of_a_small_letter_is_not_that_of_the_large_one() -> None:
     assert values(found(CRADLE + "M208 'b-5:5\n"), "B")["limits"] == [-100.0, 100.0]
 
 
-def test_a_macro_that_is_not_beside_the_file_is_named() -> None:
+def test_a_macro_missing_next_to_the_file_is_reported() -> None:
     assert found(CRADLE + 'M98 P"drives.g"\n').remarks == []
     told = read(ConfigText("config.g", SPEEDS + CRADLE.replace("speeds.g", "drives.g")))
     assert told.remarks == ["drives.g is not beside it: its settings are unknown"]
@@ -159,7 +159,7 @@ def test_the_object_model_names_its_kinematics() -> None:
         found(model() + '\n{"key": "move.kinematics", "result": {"name": "FiveBarScara"}}')
 
 
-def test_the_object_models_heaters_are_found_by_their_numbers() -> None:
+def test_heaters_of_the_object_model_are_found_by_their_numbers() -> None:
     told = found(model())
     assert (told.firmware, told.rotary) == ("RepRapFirmware for Duet 3 MB6HC 3.5.4", "AC")
     assert told.settings["bed_limit_c"].value == 0.0

@@ -73,7 +73,7 @@ def test_the_page_and_the_state_are_served(watched: Watched) -> None:
 
 
 @pytest.mark.parametrize("path", ["/etc/passwd", "/../state", "/state/", "/favicon.ico"])
-def test_nothing_else_is_served(watched: Watched, path: str) -> None:
+def test_other_paths_return_404(watched: Watched, path: str) -> None:
     assert asked(watched, path)[0].status == 404
 
 
