@@ -8,6 +8,7 @@ f-string puts it into another message; its str() is for the terminal.
 
 import re
 from collections.abc import Callable
+from math import floor, log10
 
 _BEGIN, _BETWEEN, _END = "\ufdd0", "\ufdd1", "\ufdd2"
 _INSIDE = f"([^{_BEGIN}-{_END}]*)"
@@ -34,6 +35,13 @@ def phrase(name: str, terminal: str, value: object = "") -> str:
     """Words of the terminal that the page replaces by its own, found by a name; "": it omits them. value: a value in the page's
     words."""
     return _mark(name, f"{value}", terminal)
+
+
+def three_digits(value: float, decimals: int = 2) -> str:
+    """Format a measure with at most three significant digits and at most this many decimals: 9.45, 20.7, 125, 1230."""
+    rounded = float(f"{value:.3g}")
+    places = min(decimals, max(2 - floor(log10(abs(rounded))), 0)) if rounded else decimals
+    return f"{round(rounded, places) + 0.0:.{places}f}"  # a negative zero becomes 0
 
 
 def is_phrase(name: str, message: str) -> bool:

@@ -14,6 +14,7 @@ from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import SUPPORT, Beads
 from machine.gcode.reader.parsed import Indices32, ParsedProgram, Remarks, pieces
+from machine.quantities import amount
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from slicer.paths import ON_PLATE_MM, Kind
@@ -74,8 +75,8 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
             seen.add(part)
             row, layers = int(high[gaps[0]]), len(np.unique(layer[remark[gaps]]))
             message = (
-                f"layer {layer[program.remark[row]]} begins {gap[gaps[0]]:.2f} mm above all that lies below it: it should lie on "
-                f"it (layers: {layers})"
+                f"layer {layer[program.remark[row]]} begins {amount(gap[gaps[0]])} mm above all that lies below: it should lie "
+                f"on it (layers: {layers})"
             )
             problems.append(at_row(program, row, "error", "gap", message))
     return problems
@@ -140,8 +141,9 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> I
     for mine in by_part(program, rows[np.isin(program.layer_keys(rows), bad)]):
         layer = program.layer_keys(mine).min()
         row = int(mine[np.argmax(program.layer_keys(mine) == layer)])
+        part_mm, whole_mm = amount(loose[layer], 1), amount(whole[layer], 1)
         message = (
-            f"{loose[layer]:.1f} mm of the {whole[layer]:.1f} mm of layer {program.layer[row]} have nothing under them, in "
+            f"{part_mm} mm of the {whole_mm} mm of layer {program.layer[row]} have nothing under them, in "
             f"stretches longer than sparse infill's cells are wide: a layer below it is missing"
         )
         yield at_row(program, row, "error", "gap", message)

@@ -18,7 +18,7 @@ from machine.printing.rescue import STOPPED
 from machine.printing.serial_log import SerialLog
 from machine.printing.servers.follow import Follower
 from machine.printing.servers.server import GcodeUpload, Identity, PrintServer
-from machine.quantities import duration
+from machine.quantities import amount, duration
 from profiles.errors import FirmwareError, NoAnswerError, ServerError
 from profiles.machine import Machine
 
@@ -240,4 +240,4 @@ class ReportedProgress:
 
 
 def _megabytes(count: int) -> str:
-    return f"{count / 1e6:.1f} MB"
+    return f"{amount(count / 1e6, 1)} MB"

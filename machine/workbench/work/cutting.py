@@ -21,7 +21,7 @@ from machine.pipeline.pictures import PLAIN, contact_sheet, front_picture, parts
 from machine.pipeline.project import PICTURE_PX, STANDING, project_bytes, read_folder, with_meshes_beside
 from machine.planning.fit import check_parts
 from machine.planning.stops import check_stop_parts
-from machine.quantities import amount, newtons
+from machine.quantities import amount, newtons, percent
 from machine.view.encoding import pack
 from machine.view.parts import page_colours, part_colours
 from machine.view.scene import solids, surfaces
@@ -102,7 +102,7 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
                 compilers.wait_for(compilers.SEARCH, lambda text, share=None: tell(Searched(text, best)))
                 tell(Searched(f"{otherwise}looking for the first cut along {profile.search.directions:,} directions", best))
                 return
-            left = f"{100 * best_share:.1f} % of the overhangs left"
+            left = f"{percent(best_share, 1)} % of the overhangs left"
             if candidate is mesh:
                 best = measure()  # planes of another orientation do not fit the model in the picture
             tell(Searched(f"{otherwise}trying cut {stage}, {left}", best))
