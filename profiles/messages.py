@@ -32,8 +32,8 @@ def advice(name: str, value: object, verb: str = "") -> str:
 
 
 def phrase(name: str, terminal: str, value: object = "") -> str:
-    """Words of the terminal that the page replaces by its own, found by a name; "": it omits them. value: a value in the page's
-    words."""
+    """A phrase that the terminal and the page word differently. terminal: the words of the terminal. The page writes its own phrase
+    of this name with the value in it, or nothing if it has none. value: as the page writes it."""
     return _mark(name, f"{value}", terminal)
 
 
@@ -65,7 +65,7 @@ def terminal_words(message: str) -> str:
 
 
 def rendered(message: str, words: Callable[[str, str, str], str]) -> str:
-    """The message without marks. words: what takes the place of one, by its name, its value and the words of the terminal.
+    """The message with its marks replaced. words: the replacement of a mark, from its name, value and terminal phrase.
 
     >>> rendered(f"{option('parts', 0)}: 1 is the least", lambda name, value, terminal: f"{name}={value}")
     '--parts=0: 1 is the least'

@@ -1,4 +1,4 @@
-"""Layering: findings about layers that are not on each other: one is missing, or part of one is printed too high.
+"""Layering: findings about layers that do not lie on each other: a layer is missing, or a piece of one is printed too high.
 
 Two signs: a bead that begins above everything its part has printed before, by the file's heights; and a layer most of whose beads
 have no plastic below them.
@@ -31,7 +31,7 @@ CRUMB_MM = 1.0  # a shorter layer is the tip of something too fine to print
 
 
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
-    """Errors of code gap, in every part the first sign."""
+    """Errors with the code gap: the first one in each part."""
     signs = [*_too_high(program, deposited, contacts), *_floating(program, deposited, contacts)]
     first: dict[int, Finding] = {}
     for sign in sorted(signs, key=lambda finding: finding.line):

@@ -78,7 +78,7 @@ class SerialPrinter:
             return nullcontext()
 
     def fits(self, machine: Machine) -> str:
-        """A sentence that the printer fits a machine."""
+        """Sentence for the user: the printer matches the machine of the profile."""
         if isinstance(self._at, Simulated):
             times = "" if self._at.speed == 1.0 else f"{self._at.speed:g} times "
             speed = f"{times}as fast as a real one" if self._at.speed else "as fast as it can"

@@ -44,7 +44,7 @@ class ServerPrinter:
             check_free(self.server.name, self.server.status())
 
     def fits(self, machine: Machine) -> str:
-        """A sentence that the printer fits a machine."""
+        """Sentence for the user: the server answers, and its printer matches the machine of the profile."""
         free = ", is free," if self._job.starts else ""
         return f"{self.identity.text} answers at {self.server.name}{free} and prints for {machine.name}"
 

@@ -127,8 +127,10 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
 
 
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile, recommended: int = 0) -> tuple[FrontRow, ...]:
-    """The measured front of a plan for the model on the bench. recommended: number of parts that the search preferred. A front
-    that was found stays as it is if the plan's parts have been changed by hand since. Raises PlanError if they cannot be cut."""
+    """The measured front of a plan for the model on the bench. recommended: number of parts that the search preferred.
+
+    The front of a search stays as it is if the plan's parts have been changed by hand since. Raises PlanError if they cannot be cut.
+    """
     found = {row.parts: planned_parts(row) for row in plan.front}
     if found and plan.parts not in found.values():
         cut_bench(bench, replace(plan, front=()))
@@ -244,7 +246,7 @@ def draw_pieces(tell: Tell, bench: Bench, out: Path) -> None:
 
 
 def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
-    """Surfaces and figures of all parts in print order, and as `fit` why the machine cannot reach them, in the words of
+    """Surfaces and figures of all parts in print order; under the key `fit`, why the machine cannot reach them, in the words of
     `export`."""
     colours = page_colours(len(decomposition.parts))
     records = solids(decomposition, profile, joints_of(decomposition.parts, profile))
