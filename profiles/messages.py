@@ -32,8 +32,8 @@ def advice(name: str, value: object, verb: str = "") -> str:
 
 
 def phrase(name: str, terminal: str, value: object = "") -> str:
-    """A phrase that the terminal and the page word differently. terminal: the words of the terminal. The page writes its own phrase
-    of this name with the value in it, or nothing if it has none. value: as the page writes it."""
+    """A phrase that the terminal and the page word differently. terminal: the words of the terminal. The page writes its own
+    phrase of this name with the value in it, or nothing if it has none. value: as the page writes it."""
     return _mark(name, f"{value}", terminal)
 
 

@@ -129,7 +129,8 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile, recommended: int = 0) -> tuple[FrontRow, ...]:
     """The measured front of a plan for the model on the bench. recommended: number of parts that the search preferred.
 
-    The front of a search stays as it is if the plan's parts have been changed by hand since. Raises PlanError if they cannot be cut.
+    The front of a search stays as it is if the plan's parts have been changed by hand since. Raises PlanError if they cannot be
+    cut.
     """
     found = {row.parts: planned_parts(row) for row in plan.front}
     if found and plan.parts not in found.values():
