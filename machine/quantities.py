@@ -3,6 +3,7 @@
 from math import pi
 
 from profiles.material import Material
+from profiles.messages import three_digits
 
 
 def duration(seconds: float) -> str:
@@ -33,15 +34,13 @@ def newtons(force_n: float) -> str:
 
 
 def amount(value: float, decimals: int = 2) -> str:
-    """Format with at most three significant digits and at most this many decimals: 9.45, 20.7, 125, 1230; a negative value, which
-    rounding leaves of 0, as 0."""
-    rounded = float(f"{max(value, 0.0):.3g}")
-    return f"{rounded:.{min(decimals, 2 if rounded < 10.0 else 1 if rounded < 100.0 else 0)}f}"
+    """Format like three_digits(); a negative value, which rounding leaves of 0, as 0."""
+    return three_digits(max(value, 0.0), decimals)
 
 
 def percent(share: float | None, digits: int = 0) -> str:
-    """Format a share as percent without the sign; a dash if None."""
-    return "-" if share is None else f"{100.0 * share:.{digits}f}"
+    """Format a share as percent without the sign, like three_digits(); a dash if None. digits: decimals below 100 %."""
+    return "-" if share is None else three_digits(100.0 * share, digits)
 
 
 def filament_cm3(filament_mm: float, material: Material) -> float:

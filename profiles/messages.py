@@ -8,6 +8,7 @@ f-string puts it into another message; its str() is for the terminal.
 
 import re
 from collections.abc import Callable
+from math import floor, log10
 
 _BEGIN, _BETWEEN, _END = "\ufdd0", "\ufdd1", "\ufdd2"
 _INSIDE = f"([^{_BEGIN}-{_END}]*)"
@@ -31,9 +32,16 @@ def advice(name: str, value: object, verb: str = "") -> str:
 
 
 def phrase(name: str, terminal: str, value: object = "") -> str:
-    """Words of the terminal that the page replaces by its own, found by a name; "": it omits them. value: a value in the page's
-    words."""
+    """A phrase that the terminal and the page word differently. terminal: the words of the terminal. The page writes its own
+    phrase of this name with the value in it, or nothing if it has none. value: as the page writes it."""
     return _mark(name, f"{value}", terminal)
+
+
+def three_digits(value: float, decimals: int = 2) -> str:
+    """Format a measure with at most three significant digits and at most this many decimals: 9.45, 20.7, 125, 1230."""
+    rounded = float(f"{value:.3g}")
+    places = min(decimals, max(2 - floor(log10(abs(rounded))), 0)) if rounded else decimals
+    return f"{round(rounded, places) + 0.0:.{places}f}"  # a negative zero becomes 0
 
 
 def is_phrase(name: str, message: str) -> bool:
@@ -57,7 +65,7 @@ def terminal_words(message: str) -> str:
 
 
 def rendered(message: str, words: Callable[[str, str, str], str]) -> str:
-    """The message without marks. words: what takes the place of one, by its name, its value and the words of the terminal.
+    """The message with its marks replaced. words: the replacement of a mark, from its name, value and terminal phrase.
 
     >>> rendered(f"{option('parts', 0)}: 1 is the least", lambda name, value, terminal: f"{name}={value}")
     '--parts=0: 1 is the least'

@@ -97,7 +97,7 @@ def _with_place(found: Sequence[Place], new: Place) -> list[Place]:
 
 
 def volume_sections(part: Part, volume: Volume, cuts_mm: Floats) -> list[Polygons]:
-    """The sections of a volume in each layer of a part, limited to the volume's room."""
+    """The sections of a volume in each layer of a part, limited to its `room`, the box around its model."""
     mesh = volume.mesh if isinstance(volume, MeshVolume) else convex_hull(volume.corners)
     in_part = mesh.transform(part.rotation, (0.0, 0.0, -part.base.offset_mm))
     areas = [clean(loops, 0.0) for loops in cross_sections(in_part, cuts_mm)]

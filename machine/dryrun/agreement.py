@@ -19,6 +19,7 @@ from machine.dryrun.dryrun import DryRun
 from machine.dryrun.findings import Finding, at_row
 from machine.dryrun.interfaces import Lattice, inside_loops
 from machine.dryrun.placement import unsupported_mm
+from machine.quantities import amount, percent
 from mdp.cut import mesh_of, solid_of
 from mdp.kernels.arrays import floats, longs
 from mdp.kernels.kernel import kernel
@@ -99,13 +100,13 @@ def _findings(run: DryRun, outside: Indices, result: Agreement, solid: bool) -> 
     """Findings of outside and unfilled. outside: rows with plastic outside the model; solid: the model should be filled."""
     if result.outside > MOST_OUTSIDE:
         message = (
-            f"{100 * result.outside:.1f} % of the extruded length lie outside the model by more than half a line, "
-            f"{result.farthest_mm:.2f} mm and more at the worst"
+            f"{percent(result.outside, 1)} % of the extruded length lie outside the model by more than half a line, "
+            f"{amount(result.farthest_mm)} mm and more at the worst"
         )
         yield at_row(run.program, int(outside[0]), "error", "outside", message)
     if solid and result.filled < LEAST_FILLED:
         message = (
-            f"the beads fill {100 * result.filled:.1f} % of the model, at 100 % infill {100 * LEAST_FILLED:g} % are expected"
+            f"the beads fill {percent(result.filled, 1)} % of the model, at 100 % infill {100 * LEAST_FILLED:g} % are expected"
         )
         yield Finding("warning", "unfilled", 0, 0, 0, message)
 
@@ -116,7 +117,7 @@ def _shift_findings(run: DryRun, shifted: Mapping[int, tuple[int, Floats]]) -> I
         size_mm = float(np.linalg.norm(by_mm))
         if size_mm > MOST_SHIFT_MM:
             by = " ".join(f"{letter}{value:+.2f}" for letter, value in zip("XYZ", by_mm, strict=True))
-            message = f"part {part} lies {size_mm:.2f} mm beside the model, by {by}, {MOST_SHIFT_MM:g} mm are allowed"
+            message = f"part {part} lies {amount(size_mm)} mm beside the model, by {by}, {MOST_SHIFT_MM:g} mm are allowed"
             yield at_row(run.program, row, "error", "shift", message)
 
 

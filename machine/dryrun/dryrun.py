@@ -68,7 +68,7 @@ class DryRun:
 
     @property
     def errors(self) -> tuple[Finding, ...]:
-        """The findings that refuse a print."""
+        """The findings because of which a print is refused."""
         return errors_of(self.findings)
 
 

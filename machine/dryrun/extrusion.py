@@ -32,7 +32,7 @@ FEW = 0.03
 
 
 def findings(program: ParsedProgram, deposited: Beads, profile: Profile) -> Iterator[Finding]:
-    """Errors of code extrusion and extruding-travel; a warning of code extrusion in a file without width comments."""
+    """Errors with the codes extrusion and extruding-travel; without width comments, warnings about whole layers."""
     if not len(deposited.rows):
         return
     remarks = program.remarks

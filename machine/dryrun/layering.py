@@ -1,4 +1,4 @@
-"""Layering: findings about layers that are not on each other: one is missing, or part of one is printed too high.
+"""Layering: findings about layers that do not lie on each other: a layer is missing, or a piece of one is printed too high.
 
 Two signs: a bead that begins above everything its part has printed before, by the file's heights; and a layer most of whose beads
 have no plastic below them.
@@ -14,6 +14,7 @@ from machine.dryrun.findings import Finding, at_row, by_part
 from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import SUPPORT, Beads
 from machine.gcode.reader.parsed import Indices32, ParsedProgram, Remarks, pieces
+from machine.quantities import amount
 from mdp.kernels.kernel import kernel
 from mdp.mesh import Floats, Indices
 from slicer.paths import ON_PLATE_MM, Kind
@@ -30,7 +31,7 @@ CRUMB_MM = 1.0  # a shorter layer is the tip of something too fine to print
 
 
 def findings(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> list[Finding]:
-    """Errors of code gap, in every part the first sign."""
+    """Errors with the code gap: the first one in each part."""
     signs = [*_too_high(program, deposited, contacts), *_floating(program, deposited, contacts)]
     first: dict[int, Finding] = {}
     for sign in sorted(signs, key=lambda finding: finding.line):
@@ -74,8 +75,8 @@ def _too_high(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> l
             seen.add(part)
             row, layers = int(high[gaps[0]]), len(np.unique(layer[remark[gaps]]))
             message = (
-                f"layer {layer[program.remark[row]]} begins {gap[gaps[0]]:.2f} mm above all that lies below it: it should lie on "
-                f"it (layers: {layers})"
+                f"layer {layer[program.remark[row]]} begins {amount(gap[gaps[0]])} mm above all that lies below: it should lie "
+                f"on it (layers: {layers})"
             )
             problems.append(at_row(program, row, "error", "gap", message))
     return problems
@@ -140,8 +141,9 @@ def _floating(program: ParsedProgram, deposited: Beads, contacts: Contacts) -> I
     for mine in by_part(program, rows[np.isin(program.layer_keys(rows), bad)]):
         layer = program.layer_keys(mine).min()
         row = int(mine[np.argmax(program.layer_keys(mine) == layer)])
+        part_mm, whole_mm = amount(loose[layer], 1), amount(whole[layer], 1)
         message = (
-            f"{loose[layer]:.1f} mm of the {whole[layer]:.1f} mm of layer {program.layer[row]} have nothing under them, in "
+            f"{part_mm} mm of the {whole_mm} mm of layer {program.layer[row]} have nothing under them, in "
             f"stretches longer than sparse infill's cells are wide: a layer below it is missing"
         )
         yield at_row(program, row, "error", "gap", message)

@@ -10,6 +10,7 @@ from machine.dryrun.replay import Contacts
 from machine.dryrun.strokes import CROSSING_MM, ON_PLATE, SUPPORT, Beads, highest_of
 from machine.gcode.reader.parsed import ParsedProgram, pieces
 from machine.planning.limits import over_edge_mm
+from machine.quantities import amount
 from mdp.mesh import Floats
 from profiles.profile import Profile
 from slicer.paths import Kind
@@ -46,8 +47,8 @@ def _too_low(program: ParsedProgram, contacts: Contacts) -> Iterator[Finding]:
     for rows in by_part(program, np.flatnonzero(contacts.close_mm > 0.0)):
         left = max(CROSSING_MM - float(contacts.close_mm[rows].max()), 0.0)
         message = (
-            f"the tip crosses the print {left:.2f} mm above it on the way to or from a turn of the table, {CROSSING_MM:g} mm are "
-            f"needed (moves: {len(rows)})"
+            f"the tip crosses the print {amount(left)} mm above it on the way to or from a turn of the table, {CROSSING_MM:g} mm "
+            f"are needed (moves: {len(rows)})"
         )
         yield at_row(program, int(rows[0]), "error", "low-travel", message)
 
@@ -69,11 +70,15 @@ def _in_air(program: ParsedProgram, length: Floats, contacts: Contacts) -> Itera
         grave = lost or loose > ERROR_SHARE * whole or stretch > STRETCH_MM
         severity: Severity = "error" if grave else "warning"
         of_support = float(hanging[mine & support].sum())
-        at_once = f", {stretch:.1f} mm of it in one stretch ({STRETCH_MM:g} mm are allowed)" if stretch > STRETCH_MM else ""
-        message = f"{loose:.1f} mm of {whole:.0f} mm are extruded into air{at_once}, nothing lies under or beside them: "
-        message += f"{loose - of_support:.1f} mm of the part, {of_support:.1f} mm of its support"
+        at_once = (
+            f", {amount(stretch, 1)} mm of it in one stretch ({STRETCH_MM:g} mm are allowed)" if stretch > STRETCH_MM else ""
+        )
+        message = (
+            f"{amount(loose, 1)} mm of {amount(whole, 0)} mm are extruded into air{at_once}, nothing lies under or beside them: "
+        )
+        message += f"{amount(loose - of_support, 1)} mm of the part, {amount(of_support, 1)} mm of its support"
         if lost:
-            message = f"the part begins in air: {first:.1f} mm of its first layer have nothing under them"
+            message = f"the part begins in air: {amount(first, 1)} mm of its first layer have nothing under them"
         rows = begins & (contacts.air_mm > 0) if lost else mine & (hanging > 0)
         row = at if stretch > STRETCH_MM and not lost else int(np.flatnonzero(rows)[0])
         yield at_row(program, row, severity, "air", message)
@@ -101,7 +106,7 @@ def _in_plastic(program: ParsedProgram, length: Floats, contacts: Contacts) -> I
     filled = np.flatnonzero(counted & (contacts.overlapping_mm > 0))
     for rows in by_part(program, filled[np.isin(program.layer_keys(filled), bad)]):
         groups = np.unique(program.layer_keys(rows))
-        message = f"{overlapping[groups].sum():.1f} mm are extruded where plastic already is (layers: {len(groups)})"
+        message = f"{amount(overlapping[groups].sum(), 1)} mm are extruded where plastic already is (layers: {len(groups)})"
         yield at_row(program, int(rows[0]), "error", "filled", message)
 
 

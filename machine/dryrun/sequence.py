@@ -6,6 +6,7 @@ import numpy as np
 
 from machine.dryrun.findings import Finding, at_row, by_part
 from machine.gcode.reader.parsed import MoveKind, ParsedProgram, pieces
+from machine.quantities import amount
 from profiles.profile import Profile
 from slicer.paths import Kind
 
@@ -47,7 +48,7 @@ def _layers(program: ParsedProgram) -> Iterator[Finding]:
     for mine in by_part(program, np.concatenate(lower) + 1, rows):
         k = int(mine[0]) - 1
         fall_mm = program.end[rows[k], 2] - program.end[rows[k + 1], 2]
-        message = f"layer {program.layer[rows[k + 1]]} lies {fall_mm:.2f} mm lower than the layer before it"
+        message = f"layer {program.layer[rows[k + 1]]} lies {amount(fall_mm)} mm lower than the layer before it"
         yield at_row(program, int(rows[k + 1]), "error", "order", message)
 
 
@@ -96,8 +97,10 @@ def _far_pulled(program: ParsedProgram) -> Iterator[Finding]:
     pulled = filament_mm[beads[np.searchsorted(beads, rows) - 1]] - filament_mm[rows]  # since the bead before each row
     far = np.flatnonzero(pulled > MOST_PULLED_MM)
     for mine in by_part(program, far, rows):
-        row, amount = int(rows[mine[0]]), float(pulled[mine[0]])
-        message = f"{amount:.1f} mm of filament are pulled back, {MOST_PULLED_MM:g} mm are allowed: more leaves the hot end"
+        row, pulled_mm = int(rows[mine[0]]), float(pulled[mine[0]])
+        message = (
+            f"{amount(pulled_mm, 1)} mm of filament are pulled back, {MOST_PULLED_MM:g} mm are allowed: more leaves the hot end"
+        )
         yield at_row(program, row, "error", "retraction", message)
 
 

@@ -31,7 +31,7 @@ def sweep_rad(start: Point, end: Point, centre: Point, clockwise: bool) -> float
 
 
 def arc_centre(start: Point, end: Point, shape: Mapping[str, float], clockwise: bool) -> Point | None:
-    """Centre by the words I J or R of an arc, mm; None without these, or if the ends are too far apart for R. An R below 0
+    """Centre of an arc by its words I J or R, mm; None without these, or if the ends are too far apart for R. An R below 0
     selects the longer arc."""
     if "R" not in shape:
         return (start[0] + shape.get("I", 0.0), start[1] + shape.get("J", 0.0)) if shape else None

@@ -53,7 +53,7 @@ def lies_freely(profile: Profile) -> bool:
 
 
 def as_turned(profile: Profile, orientation: Floats | None) -> Profile:
-    """The profile with rotate_deg including a further (3, 3) rotation, so that its G-code records the orientation; None: none."""
+    """The profile whose rotate_deg includes a further (3, 3) rotation, or None, so that its G-code records the orientation."""
     if orientation is None:
         return profile
     rotate_deg = turned_further(profile.process.rotate_deg, orientation)

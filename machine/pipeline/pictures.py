@@ -29,6 +29,7 @@ from mdp.mesh import Floats, Mesh
 from mdp.overhang import Mask, risky_above, risky_upright
 from mdp.pose import UP, Pose, unit
 from profiles.machine import Machine
+from profiles.messages import three_digits
 from profiles.profile import Profile
 
 if TYPE_CHECKING:  # only calibration loads it
@@ -202,7 +203,7 @@ def _label(frame: Image, part: Part, machine: Machine) -> Image:
     labelled = write_text(frame, str(part.index), (left, pixels / 10), pixels / 12, 90)
     axes = (("tilt", machine.tilt.letter, pose.tilt_deg), ("turn", machine.turn.letter, pose.turn_deg)) if machine.tilts else ()
     for row, (word, letter, value) in enumerate(axes):
-        text = f"{word} {letter} {round(value, 1) + 0.0:.1f}°"
+        text = f"{word} {letter} {three_digits(value, 1)}°"
         labelled = write_text(labelled, text, (left, pixels * (0.93 + 0.04 * row)), pixels / 28, 120)
     return labelled
 
@@ -231,7 +232,7 @@ def _frame(row: FrontRow, model: Mesh, profile: Profile, view: Floats, pixels: i
     figures = f"{amount(row.support_area_mm2, 0)} mm² on support, {amount(row.seam_mm, 0)} mm of seams"
     frame = write_text(frame, figures, (left, 0.93 * pixels), height, 110)
     if row.time_s is not None and row.filament_mm is not None:
-        takes = f"{minutes(row.time_s)}, {row.filament_mm / 1000:.1f} m"
+        takes = f"{minutes(row.time_s)}, {amount(row.filament_mm / 1000, 1)} m"
         frame = write_text(frame, takes, (left, 0.98 * pixels), height, 110)
     return _with_border(frame, max(2, pixels // 120)) if row.chosen else frame
 

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from machine.planning.fit import Misfit, Place, Plate, check_parts, standing_at
+from machine.quantities import amount
 from mdp.cost.footing import tips_over
 from mdp.decomposition import Decomposition, Part
 from mdp.mesh import Mesh, together
@@ -148,7 +149,8 @@ def _gap_mm(process: Process, brim_mm: float) -> float:
 def _reason(misfit: Misfit, models: Sequence[Decomposition], sizes_mm: Sequence[Place], gap_mm: float, profile: Profile) -> str:
     """Why the models do not fit on the plate together."""
     (width, depth), alike = sizes_mm[misfit.number], len(dict.fromkeys(models)) == 1
-    what = f"{models[misfit.number].name} measures {width:.1f} x {depth:.1f} mm, the plate of {profile.machine.name} has"
+    size = f"{amount(width, 1)} x {amount(depth, 1)} mm"
+    what = f"{models[misfit.number].name} measures {size}, the plate of {profile.machine.name} has"
     if alike:
         what = f"{len(models)} copies: {what}"
     if misfit.is_met:

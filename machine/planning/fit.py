@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from machine.kinematics.table import machine_points
 from machine.planning.limits import ROUNDING, axis_limits, over_edge_mm
+from machine.quantities import amount
 from mdp.clearance import find_obstacle, passes_clear
 from mdp.cut import convex_hull
 from mdp.decomposition import Decomposition, Part
@@ -86,8 +87,8 @@ def check_standing(mesh: Mesh, profile: Profile) -> None:
     if over_mm > ROUNDING:
         x, y = np.ptp(standing, axis=0)
         raise MoveError(
-            f"the first layer on the plate is {x:.1f} x {y:.1f} mm, {over_mm:.1f} mm over the edge of the plate of "
-            f"{machine.name}, {edge}: {_advice(profile)}"
+            f"the first layer on the plate is {amount(x, 1)} x {amount(y, 1)} mm, {amount(over_mm, 1)} mm over the edge of the plate "
+            f"of {machine.name}, {edge}: {_advice(profile)}"
         )
 
 
@@ -189,7 +190,11 @@ def _head_below(machine: Machine, height_mm: float) -> Iterator[tuple[Floats, Fl
 
 
 class Misfit(NamedTuple):
-    """The first box without a place: its index, how many boxes have one, and whether all would fit without the head."""
+    """Failure to place all boxes on the plate.
+
+    number: index of the first box without a place; standing: number of boxes that have a place; is_met: whether the head prevents
+    it, because all boxes fit if collisions with the head are ignored.
+    """
 
     number: int
     standing: int

@@ -172,7 +172,7 @@ def _finish(tip: Tip, part: int) -> None:
 def purge_lanes(parts: Sequence[Part], sliced: Sequence[SlicedPart], profile: Profile) -> Floats | None:
     """(n, 3) machine points of the purge line along the plate's edge, in one to four lanes; None without space for it.
 
-    It stays clear of everything that any part prints near the plate, and the head of the cradle.
+    The line keeps a distance from everything that any part prints near the plate; the head does not collide with the cradle.
     """
     machine, length_mm = profile.machine, profile.machine.purge_mm
     if length_mm <= 0.0:

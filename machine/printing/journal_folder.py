@@ -50,7 +50,7 @@ def continue_journal(program: GcodeFile, profile: Profile, name: str, file: Path
 class ResumableJournal:
     """A journal of the state folder whose print did not finish.
 
-    line: last line surely executed; written_s: time of the last record, seconds since 1970.
+    line: last line that the printer has certainly executed; written_s: time of the last record, seconds since 1970.
     """
 
     path: Path

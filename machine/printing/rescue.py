@@ -39,7 +39,8 @@ def rescue(at: SerialPort | Server, emergency: bool) -> str:
 
 
 def cancel_on_server(at: Server, file: str, away_s: float) -> bool:
-    """Cancel a print that was left, if what the server prints certainly is that print; False when nothing is printed there.
+    """Cancel a print that this program no longer follows, if it is certain that the server still prints it; False if it prints
+    nothing.
 
     file: its name on the server; away_s: seconds since it was last seen printing. Raises ServerError, and cancels nothing, when
     the server is unreachable or may be printing something else.

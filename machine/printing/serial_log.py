@@ -55,7 +55,7 @@ class SerialLog:
             self._write(_stamped(data[: end - 1], f"{self._stamp(now_s)} {direction} "), flush)
 
     def say_trouble(self, what: str = "the traffic") -> None:
-        """Report that nothing can be logged, if so. what: the content that is not logged."""
+        """Report that the log cannot be written, if that is so. what: the content that is not logged."""
         if self.trouble:
             say(f"{what} is not logged: {self.file}: {self.trouble}")
 

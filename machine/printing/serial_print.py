@@ -23,7 +23,7 @@ from machine.printing.journal_folder import new_journal
 from machine.printing.ports import describe_answer, identify_printer
 from machine.printing.serial_log import SerialLog, new_log, tap
 from machine.printing.servers.server import Identity
-from machine.quantities import duration
+from machine.quantities import amount, duration
 from machine.simulator.board import BuildOptions
 from machine.simulator.simulator import SimulatedPrinter
 from profiles.errors import OutputError, PrinterError
@@ -78,7 +78,7 @@ class SerialPrinter:
             return nullcontext()
 
     def fits(self, machine: Machine) -> str:
-        """A sentence that the printer fits a machine."""
+        """Sentence for the user: the printer matches the machine of the profile."""
         if isinstance(self._at, Simulated):
             times = "" if self._at.speed == 1.0 else f"{self._at.speed:g} times "
             speed = f"{times}as fast as a real one" if self._at.speed else "as fast as it can"
@@ -101,7 +101,7 @@ def _print_simulated(loaded: LoadedProgram, at: Simulated, scene: Scene, person:
         return report_end(outcome, scene.log)
     _, volumes = record.deposited(loaded.profile.material.diameter_mm)
     planned = float(loaded.program.run.segment_mm3.sum())
-    laid = f"{volumes.sum() / 1000:.3f} cm³ of plastic laid (planned {planned / 1000:.3f})"
+    laid = f"{amount(volumes.sum() / 1000)} cm³ of plastic laid (planned {amount(planned / 1000)})"
     heaters = "heaters off" if record.nozzle_target_c == record.bed_target_c == 0.0 else "heaters still on"
     moves = f"{len(record.start)} moves in {duration(float(record.duration_s.sum()))} of printing time"
     show(f"simulated printer: {moves}, {laid}, {heaters}\n")

@@ -18,7 +18,7 @@ from machine.printing.rescue import STOPPED
 from machine.printing.serial_log import SerialLog
 from machine.printing.servers.follow import Follower
 from machine.printing.servers.server import GcodeUpload, Identity, PrintServer
-from machine.quantities import duration
+from machine.quantities import amount, duration
 from profiles.errors import FirmwareError, NoAnswerError, ServerError
 from profiles.machine import Machine
 
@@ -44,7 +44,7 @@ class ServerPrinter:
             check_free(self.server.name, self.server.status())
 
     def fits(self, machine: Machine) -> str:
-        """A sentence that the printer fits a machine."""
+        """Sentence for the user: the server answers, and its printer matches the machine of the profile."""
         free = ", is free," if self._job.starts else ""
         return f"{self.identity.text} answers at {self.server.name}{free} and prints for {machine.name}"
 
@@ -240,4 +240,4 @@ class ReportedProgress:
 
 
 def _megabytes(count: int) -> str:
-    return f"{count / 1e6:.1f} MB"
+    return f"{amount(count / 1e6, 1)} MB"

@@ -22,7 +22,7 @@ EXTRUDES_MM = 1e-9  # smaller differences of running filament totals are roundin
 
 @dataclass(slots=True)
 class Block:
-    """A straight move of six axes; speeds along what F measures (0: X Y Z, 1: rotary, 2: filament)."""
+    """A straight move of six axes. measure: the axes along which F and all speeds count (0: X Y Z, 1: rotary, 2: filament)."""
 
     start: Axes
     end: Axes
@@ -69,7 +69,7 @@ class Block:
         return ((self.v0 + self.peak) * 0.5 * rising_s + self.peak * (t - rising_s)) / length
 
     def at(self, now_s: float) -> list[float]:
-        """The position of the axes on it."""
+        """Position of the axes at a time during the block."""
         share = self.share(now_s)
         return [a + share * (b - a) for a, b in zip(self.start, self.end, strict=True)]
 

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 from machine.dryrun.dryrun import dry_run
 from machine.gcode.reader.parsed import ParsedProgram
 from machine.program import Alternative, Program, joints_of_print
-from machine.quantities import duration
+from machine.quantities import amount, duration
 from machine.view import paths, scene
 from machine.view.encoding import pack
 from machine.view.parts import front_records, page_colours
@@ -125,7 +125,7 @@ def _summary(header: dict[str, Any], layers: int | None) -> str:
     parts, thinned = header["parts"], header["thinned"]
     phrases = [_many(len(parts), "part")] if any(part["index"] for part in parts) else []
     if layers is not None:
-        phrases += [_many(layers, "layer"), duration(header["time_s"]), f"{header['filament_mm'] / 1000.0:.2f} m of filament"]
+        phrases += [_many(layers, "layer"), duration(header["time_s"]), f"{amount(header['filament_mm'] / 1000.0)} m of filament"]
     if thinned:
         phrases.append(f"thinned: {thinned['kept']:,} of {_many(thinned['rows'], 'move')}")
     return " · ".join(phrases)

@@ -22,7 +22,7 @@ from mdp.directions.orientation import best_orientation, in_words, set_on_plate
 from mdp.joint import Joint, weakest_of
 from profiles.errors import ProfileError, counted
 from profiles.frozen import Frozen
-from profiles.messages import terminal_words
+from profiles.messages import terminal_words, three_digits
 from profiles.places import OF_KIND, shipped
 from profiles.profile import DEFAULTS, SECTIONS, Profile, label_of, load_one, rows
 
@@ -61,7 +61,7 @@ def parts_report(
     """The report of a page of parts alone; alternatives: their costs, if known."""
     facts = [
         ["parts", str(len(decomposition.parts))],
-        ["volume", f"{decomposition.volume_mm3 / 1000.0:.2f} cm³"],
+        ["volume", f"{amount(decomposition.volume_mm3 / 1000.0)} cm³"],
         *_names(profile),
     ]
     rows = [_solid(part, profile) for part in decomposition.parts]
@@ -117,9 +117,9 @@ SOLID = ["part", "tilt", "turn", "cm³", "risky mm²", "left mm²"]
 def _solid(part: Part, profile: Profile) -> Row:
     """A part's pose, volume, and areas that would need and will need support."""
     before = risky_before_mm2(part, profile.process.self_supporting_angle_deg, profile.search.count_platform_faces)
-    angles = [f"{part.pose.tilt_deg:.1f}°", f"{part.pose.turn_deg:.1f}°"]
+    angles = [f"{three_digits(angle, 1)}°" for angle in (part.pose.tilt_deg, part.pose.turn_deg)]
     areas = [amount(area, 1) for area in (before, part.risky_area_mm2)]
-    return [str(part.index), *angles, f"{part.volume_mm3 / 1000.0:.2f}", *areas]
+    return [str(part.index), *angles, amount(part.volume_mm3 / 1000.0), *areas]
 
 
 def _parts(program: Program, parts: Sequence[dict[str, Any]], profile: Profile) -> Table:
@@ -130,8 +130,8 @@ def _parts(program: Program, parts: Sequence[dict[str, Any]], profile: Profile) 
     rows = []
     for part in parts:
         index, mass_g = part["index"], filament_g(part["filament_mm"], profile.material)
-        figures = [str(part["layers"]), duration(part["time_s"]), f"{mass_g:.1f}"]
-        stands_on = [f"{interfaces.get(index, 0.0) / 1000:.2f}"] if interfaces else []
+        figures = [str(part["layers"]), duration(part["time_s"]), amount(mass_g, 1)]
+        stands_on = [amount(interfaces.get(index, 0.0) / 1000)] if interfaces else []
         rows.append([*solids.get(index, [str(index) if index else "all"]), *figures, *stands_on])
     head = [*(SOLID if solids else SOLID[:1]), "layers", "time", "g", *([STANDS_ON] if interfaces else [])]
     return _table("Parts", head, rows, [RISKY] * bool(solids) + [CUT] * bool(interfaces))
@@ -170,7 +170,7 @@ def _front(decomposition: Decomposition) -> list[Table]:
     rows, summed = [], any(row.total_mm2 is not None for row in front)
     for row in front:
         time = "–" if row.time_s is None else duration(row.time_s)
-        filament = "–" if row.filament_mm is None else f"{row.filament_mm / 1000:.1f}"
+        filament = "–" if row.filament_mm is None else amount(row.filament_mm / 1000, 1)
         areas = [amount(row.support_area_mm2, 1), amount(row.seam_mm, 0), amount(row.stairs_mm2, 0), amount(row.cost_mm2, 1)]
         total = ["–" if row.total_mm2 is None else amount(row.total_mm2, 1)] if summed else []
         rows.append([f"{row.parts}{' (chosen)' * row.chosen}", *areas, time, filament, *total])
@@ -202,7 +202,7 @@ def _kinds(run: DryRun, profile: Profile, guess: str) -> Table:
         spent.append(("waiting", run.dwell_s, 0.0))
     rows = []
     for name, seconds, e_mm in spent:
-        filament = [_format_fixed(e_mm / 1000, 2), _format_fixed(filament_g(e_mm, profile.material), 1)]
+        filament = [three_digits(e_mm / 1000), three_digits(filament_g(e_mm, profile.material), 1)]
         rows.append([name, duration(seconds), _share(seconds, run.time_s), *filament])
     notes = ["heating and homing are not counted", *([f"times as on {guess}"] if guess else [])]
     return _table("Time and material", ["kind", "time", "share", "m", "g"], rows, notes)
@@ -232,10 +232,10 @@ def _alternatives(alternatives: Sequence[Alternative]) -> Table:
         costs = ["-"] * 8
         if way.time_s is not None:
             filament_mm, mass_g, support_mm3 = (value or 0.0 for value in (way.filament_mm, way.filament_g, way.support_mm3))
-            volumes = [f"{support_mm3 / 1000:.2f}", f"{sum(way.interface_mm3.values()) / 1000:.2f}"]
-            scars = [f"{way.seam_mm:.0f}", f"{way.stairs_mm2:.0f}", str(way.findings)]
-            costs = [duration(way.time_s), f"{filament_mm / 1000:.2f}", f"{mass_g:.1f}", *volumes, *scars]
-        columns.append([*costs, f"{max(way.risky_mm2, 0.0):.1f}"])
+            volumes = [amount(support_mm3 / 1000), amount(sum(way.interface_mm3.values()) / 1000)]
+            scars = [amount(way.seam_mm, 0), amount(way.stairs_mm2, 0), str(way.findings)]
+            costs = [duration(way.time_s), amount(filament_mm / 1000), amount(mass_g, 1), *volumes, *scars]
+        columns.append([*costs, amount(way.risky_mm2, 1)])
     notes = [f"{way.name}: {terminal_words(note)}" for way in alternatives for note in (way.orientation, way.message) if note]
     rows = [[cost, *values] for cost, *values in zip(COSTS, *columns, strict=True)]
     return _table(COMPARED, ["", *(way.name for way in alternatives)], rows, notes)
@@ -248,12 +248,12 @@ def _figures(run: DryRun, profile: Profile, layers: Layers) -> list[Row]:
     costs = price_in_words(values["filament_mm"], profile.material)
     return [
         ["time", duration(values["time_s"])],
-        ["filament", f"{values['filament_mm'] / 1000:.2f} m, {mass_g:.1f} g"],
+        ["filament", f"{amount(values['filament_mm'] / 1000)} m, {amount(mass_g, 1)} g"],
         *([["costs", costs]] if costs else []),
         *([["parts", str(values["parts"])]] if values["parts"] else []),
         ["layers", count],
         *[[key, str(values[key])] for key in ("reorientations", "retractions")],
-        ["travel", f"{values['travel_mm'] / 1000:.2f} m"],
+        ["travel", f"{amount(values['travel_mm'] / 1000)} m"],
     ]
 
 
@@ -267,13 +267,8 @@ def _assumptions(profile: Profile, known: bool) -> list[Row]:
     return [["machine", machine], ["material", f"{UNKNOWN}: masses for {profile.material.name}"]]
 
 
-def _format_fixed(value: float, digits: int) -> str:
-    """The value with `digits` digits, without the sign of a negative zero."""
-    return f"{round(value, digits) + 0.0:.{digits}f}"
-
-
 def _share(part: float, whole: float) -> str:
-    return f"{_format_fixed(100.0 * part / whole if whole > 0 else 0.0, 1)} %"
+    return f"{percent(part / whole if whole > 0 else 0.0, 1)} %"
 
 
 def settings_tables(profile: Profile) -> list[Table]:

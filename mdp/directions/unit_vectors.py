@@ -34,8 +34,10 @@ def _lattice(z: Floats, place: Floats) -> Floats:
 
 
 def framed(directions: Floats, axes: Floats = AXES) -> tuple[Floats, Floats]:
-    """(k, 3) unit directions as an array for kernels, and (k, 2, 3) frames across them: the vector across the direction and the
-    one of (3, 3) axes nearest to square to it, and the vector across both.
+    """(k, 3) unit directions as an array for kernels, and (k, 2, 3) pairs of unit vectors perpendicular to each.
+
+    The first of a pair is the cross product of an axis and the direction, with the one of (3, 3) axes that is most nearly
+    perpendicular to it; the second is the cross product of the direction and the first.
     """
     aside = _cross(axes[np.abs(np.round(directions @ axes.T, 9)).argmin(axis=1)], directions)
     aside /= np.sqrt(np.vecdot(aside, aside))[:, None]

@@ -46,9 +46,10 @@ SHARED = 0.5  # share of the volume: a body that counts half of itself twice can
 
 
 def repair(surfaces: list[Surface]) -> tuple[Surface, list[str]]:
-    """One closed solid from all surfaces, and a short sentence for every repair; a sound surface is returned unchanged.
+    """Repair surfaces and unite them to one closed solid; the second value has a short sentence for every repair.
 
-    Raises MeshError (a predicate without the file's name) if that is impossible, or possible only by changing the shape.
+    A surface without defects is returned unchanged. Raises MeshError if no repair yields a closed solid of the same shape; its
+    message is a predicate, such as "encloses no volume", to which the caller adds the file's name.
     """
     before = _bounds(concatenate(surfaces))
     size = float((before[1] - before[0]).max())

@@ -11,7 +11,7 @@ from mdp.kernels.processes import parallel_map
 from mdp.ranking.node import Node
 from mdp.sweep.limbs import limb_faces
 from profiles.errors import counted
-from profiles.messages import advice
+from profiles.messages import advice, three_digits
 from profiles.profile import Profile
 
 # Costs within this share are equal: of the uncut model's cost when choosing fewer parts, of their own when choosing shorter
@@ -208,11 +208,11 @@ def _savings_notes(fewest_scars: FrontRow, taken: FrontRow) -> tuple[str, ...]:
     if fewest_scars.flaw:
         price = f", but {fewest_scars.flaw}"
     elif longer_s > 0.0:
-        price = f", but take {longer_s / 60.0:.0f} min longer" if longer_s >= 60.0 else f", but take {longer_s:.0f} s longer"
+        longer = f"{three_digits(longer_s / 60.0, 0)} min" if longer_s >= 60.0 else f"{longer_s:.0f} s"
+        price = f", but take {longer} longer"
     elif more_mm >= 50.0:
-        price = f", but take {more_mm / 1000.0:.1f} m more filament"
-    less, more = (max(row.support_area_mm2, 0.0) for row in (fewest_scars, taken))
-    support = f" (support on {less:.0f} instead of {more:.0f} mm²)" if round(less) < round(more) else ""
-    return (
-        f"{counted(parts, 'part')} would save {saved_mm2:.0f} mm² of visible marks{support}{price}: {advice('parts', parts)}",
-    )
+        price = f", but take {three_digits(more_mm / 1000.0, 1)} m more filament"
+    less, more = (three_digits(max(row.support_area_mm2, 0.0), 0) for row in (fewest_scars, taken))
+    support = f" (support on {less} instead of {more} mm²)" if float(less) < float(more) else ""
+    saved = f"{three_digits(saved_mm2, 0)} mm² of visible marks{support}{price}"
+    return (f"{counted(parts, 'part')} would save {saved}: {advice('parts', parts)}",)

@@ -55,10 +55,11 @@ ABUT = 0.45  # share of a bead's width: distance at which a line ends from the c
 
 @dataclass(frozen=True, eq=False)
 class Wall:
-    """A wall. course: (n, 3) x, y and width; level: 0 is outermost; closed: whether it is a loop, whose course ends where it
-    begins.
+    """A wall whose width may vary.
 
-    free: number of sides without an adjacent bead; piece: number of its polygon.
+    course: (n, 3) x, y and width, mm; level: 0 for the outermost wall, 1 for the next one inside; closed: whether the wall is a
+    loop, whose course repeats its first point at its end; free: number of sides, 0 to 2, on which no bead adjoins; piece: index
+    of the polygons that the wall belongs to.
     """
 
     course: Floats
@@ -69,12 +70,12 @@ class Wall:
 
     @property
     def points(self) -> Floats:
-        """(n, 2) mm; of a loop without the repeated first point."""
+        """(n, 2) points of the course, mm; a loop does not repeat its first point."""
         return np.ascontiguousarray(self.course[: -1 if self.closed else None, :2])
 
 
 def variable_walls(pieces: Sequence[Polygons], rule: Rule) -> list[Wall]:
-    """All walls of polygons, each laid out separately, piece by piece."""
+    """The walls of polygons, computed for each piece separately."""
     triangulation = triangulate([contours(piece) for piece in pieces], STEP * rule.inner)
     if triangulation is None:
         return []

@@ -1,9 +1,10 @@
-"""Quantities: the cost of a print whose material has a price."""
+"""Quantities: measures with three digits, and the cost of a print whose material has a price."""
 
 import pytest
 
 from machine.gcode.settings import foot
-from machine.quantities import amount, price, price_in_words, price_json
+from machine.quantities import amount, percent, price, price_in_words, price_json
+from profiles.messages import three_digits
 from profiles.profile import load
 
 PRICED = load(settings=["material.price_per_kg=25", "material.currency=EUR", "material.density_g_cm3=1.25"])
@@ -26,6 +27,15 @@ def test_an_amount_has_at_most_three_digits() -> None:
         "1230",
     ]
     assert [amount(value, 1) for value in (-1e-9, 0.04, 86.94, 344.8, 1784.9)] == ["0.0", "0.0", "86.9", "345", "1780"]
+
+
+def test_a_measure_with_a_sign_or_more_decimals_has_at_most_three_digits() -> None:
+    assert [three_digits(value, 1) for value in (-0.04, -9.96, -123.4, 359.96)] == ["0.0", "-10.0", "-123", "360"]
+    assert [three_digits(value, 4) for value in (0.12345, 0.012345, 0.000012)] == ["0.123", "0.0123", "0.0000"]
+
+
+def test_a_share_of_100_percent_has_no_decimals() -> None:
+    assert [percent(share, 1) for share in (None, 0.0, 0.8497, 0.9996, -0.123)] == ["-", "0.0", "85.0", "100", "-12.3"]
 
 
 def test_without_a_price_no_cost_is_shown_or_written() -> None:

@@ -2,11 +2,12 @@
 fitted to it.
 
 `python tools/campaigns/fit_choices.py add LIST.csv OFFERS.jsonl VERDICTS.csv...` measures the alternatives of
-tools/campaigns/offer_parts.py and adds them to the book; a file of verdicts has lines of sheet, the letters that are best,
-acceptable and wrong, and a reason. `fit` fits weights to all pairs that a judge marks differently, by the model of Bradley and
-Terry (1952): the probability that one alternative is preferred is logistic in the difference of their costs, relative to the
-model's surface. It reports how many pairs the weights of the profile (`--set KEY=VALUE`) and the fitted ones order as the judges
-do, with cross-validation over tenths of the models' sources, and how the judges mark the profile's choice on each sheet.
+tools/campaigns/offer_parts.py and adds them to the book; each line of a file of verdicts has a sheet, the letters of its best,
+acceptable and wrong alternatives, and a reason. `fit` fits weights to all pairs that a judge marks differently, by the model
+of Bradley and Terry (1952): the probability that one alternative is preferred is logistic in the difference of their costs,
+relative to the model's surface. It reports how many pairs the weights of the profile (`--set KEY=VALUE`) and the fitted ones
+order as the judges do, with cross-validation over tenths of the models' sources, and how the judges mark the profile's choice
+on each sheet.
 """
 
 import argparse

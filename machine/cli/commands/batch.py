@@ -24,7 +24,7 @@ from machine.pipeline.batch_model import (
     row_of,
 )
 from machine.pipeline.output import check_folder, check_writable, delete
-from machine.quantities import duration
+from machine.quantities import amount, duration
 from mdp.batch.pool import connected
 from mdp.batch.progress import BatchProgress
 from mdp.batch.rows import append_row, read_rows, write_rows, writing_alone
@@ -160,7 +160,7 @@ def summary(rows: Iterable[Row], table: Path) -> str:
     done = [row for row in rows if row.status == DONE]
     if done:
         filament_m = sum(row.filament_mm for row in done) / 1000.0
-        text += f"; to print: {duration(sum(row.time_s for row in done))}, {filament_m:.1f} m of filament"
+        text += f"; to print: {duration(sum(row.time_s for row in done))}, {amount(filament_m, 1)} m of filament"
     lines = [f"{count:6} {reason}" for reason, count in reasons(rows)]
     return "\n".join([text, *lines, f"a row for each is in {table}"]) + "\n"
 

@@ -22,7 +22,7 @@ from machine.pipeline.pictures import contact_sheet, front_picture, parts_pictur
 from machine.pipeline.pipeline import build, decompose_model
 from machine.pipeline.project import with_meshes
 from machine.pipeline.requests import STDOUT, ModelRequest, Outputs
-from machine.quantities import amount
+from machine.quantities import amount, percent
 from machine.view.page import parts_page
 from mdp.decomposition import Decomposition, FrontRow
 from mdp.joint import joints_of
@@ -127,7 +127,7 @@ def _ways_table(ways: Sequence[tuple[str, FrontRow]]) -> str:
     rows = [["print it", "needs support mm²", "less", "seams mm", "stair-stepping mm²", "cost mm²", "time", "filament m"]]
     for number, (name, row) in enumerate(ways):
         less = 1.0 - row.support_area_mm2 / first_mm2 if first_mm2 > 0.0 else 0.0
-        share = f"{round(100 * less, 1) + 0.0:.1f} %" if number else ""
+        share = f"{percent(less, 1)} %" if number else ""
         areas = [amount(row.support_area_mm2, 1), share, amount(row.seam_mm, 0), amount(row.stairs_mm2, 0)]
         rows.append([name, *areas, amount(row.cost_mm2, 1), *estimates(row)])
     return table(rows)

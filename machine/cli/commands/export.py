@@ -82,8 +82,10 @@ def folder_line(model: str) -> str:
 
 
 def default_gcode(model: str, request: ModelRequest) -> Path:
-    """The G-code file where none is named: here, by the model's name. Raises OutputError if it exists and was not made of the
-    same models, or cannot be read. model: as the user named it."""
+    """The G-code file if the user names none: in the current folder, named after the model. model: as the user named it.
+
+    Raises OutputError if the file exists and was not made of the same models, or cannot be read.
+    """
     path = Path(plain_name(Path(model.removeprefix(DEMO)).stem) + ".gcode")
     if not path.is_file():
         return path

@@ -11,7 +11,7 @@ from machine.firmware import dialect_of, dialects
 from machine.firmware.firmware import check_baud
 from machine.notices import say, show
 from machine.printing.ports import announced
-from machine.quantities import duration
+from machine.quantities import amount, duration
 from machine.simulator.board import BuildOptions, build_options
 from machine.simulator.contact import ProbedTable, TrueBall
 from machine.simulator.faults import FaultScript, read_script
@@ -116,7 +116,7 @@ def summary(record: Record) -> str:
     """Summary of a simulated print."""
     lines = [
         f"{record.moves} moves in {duration(record.moving_s)}, {record.lines} lines, {record.strokes} strokes of "
-        f"{record.pushed_mm:.1f} mm filament",
+        f"{amount(record.pushed_mm, 1)} mm filament",
         f"{record.clamped} coordinates out of limits, {record.unknown} unknown commands",
         f"{record.underruns} stops because no line came in time, {record.slowed} moves slowed down for lack of lines",
     ]

@@ -9,6 +9,7 @@ from machine.pipeline.output import check_model_files, check_writable, write_byt
 from machine.pipeline.programs import load_program
 from machine.pipeline.requests import ModelRequest
 from machine.program import Program
+from machine.quantities import amount
 from machine.view.page import DATA, print_page
 from machine.view.paths import MOST_ROWS
 from machine.view.scene import relevant_findings
@@ -31,7 +32,7 @@ def view(request: ModelRequest, open_browser: bool = False) -> int:
     alternatives = compare_with_one_part(program, profile) if request.compare else ()
     content = print_page(request.name, program, profile, known=known, alternatives=alternatives)
     write_bytes(path, content)
-    show(plain_line(f"wrote {path}: {len(content) / 1e6:.1f} MB, {_in_words(program, known)}") + "\n")
+    show(plain_line(f"wrote {path}: {amount(len(content) / 1e6, 1)} MB, {_in_words(program, known)}") + "\n")
     if open_browser and not webbrowser.open(path.resolve().as_uri()):
         say(f"no browser could be started: open {path} in one")
     return 0

@@ -11,7 +11,7 @@ from machine.dryrun.dryrun import DryRun, summary
 from machine.pipeline.requests import STDOUT
 from machine.program import Alternative, Program
 from machine.quantities import amount, duration, filament_g, minutes, newtons, percent, price_in_words, price_json
-from profiles.messages import terminal_words
+from profiles.messages import terminal_words, three_digits
 from profiles.profile import Profile
 from slicer.paths import SlicedPart
 
@@ -45,12 +45,12 @@ def parts_table(
 
     rows = [["part", "tilt deg", "turn deg", "base mm", "volume mm³", "share", "needs support mm²", "uncut"]]
     for part in decomposition.parts:
-        angles = [f"{part.pose.tilt_deg:.1f}", f"{part.pose.turn_deg:.1f}", f"{part.base.offset_mm:.1f}"]
-        share = f"{100 * part.volume_mm3 / decomposition.volume_mm3:.1f} %"
+        angles = [three_digits(value, 1) for value in (part.pose.tilt_deg, part.pose.turn_deg, part.base.offset_mm)]
+        share = f"{percent(part.volume_mm3 / decomposition.volume_mm3, 1)} %"
         areas = [amount(part.risky_area_mm2, 1), amount(risky_before_mm2(part, angle_deg, count_platform_faces), 1)]
         rows.append([str(part.index), *angles, amount(part.volume_mm3, 0), share, *areas])
     front = "\n" + front_table(decomposition.front) if len(decomposition.front) > 1 else ""
-    effort = f"{decomposition.candidates_evaluated} candidates in {decomposition.search_s:.1f} s\n" if verbose else ""
+    effort = f"{decomposition.candidates_evaluated} candidates in {amount(decomposition.search_s, 1)} s\n" if verbose else ""
     return table(rows) + effort + front + "\n"
 
 
@@ -184,8 +184,8 @@ def interfaces_line(interface_mm3: Mapping[int, float]) -> str:
     """Line with the additional plastic of each interface; "" for a model in one piece."""
     if not interface_mm3:
         return ""
-    of_parts = ", ".join(f"part{NO_BREAK}{index} {mm3 / 1000:.2f}" for index, mm3 in interface_mm3.items())
-    sentence = f"interfaces take {sum(interface_mm3.values()) / 1000:.2f} cm³ that one piece would not: {of_parts}"
+    of_parts = ", ".join(f"part{NO_BREAK}{index} {amount(mm3 / 1000)}" for index, mm3 in interface_mm3.items())
+    sentence = f"interfaces take {amount(sum(interface_mm3.values()) / 1000)} cm³ that one piece would not: {of_parts}"
     lines = wrap(sentence, WIDEST, subsequent_indent="  ", break_long_words=False)
     return "\n".join(lines).replace(NO_BREAK, " ") + "\n"
 
@@ -199,9 +199,9 @@ def pins_line(sliced: Sequence[SlicedPart]) -> str:
 def agreement_line(agreed: "Agreement") -> str:
     """Sentence on how well the plastic agrees with the model."""
     sentence = (
-        f"the beads fill {100 * agreed.filled:.1f} % of the model; of their length {100 * agreed.outside:.2f} % lie outside it "
-        f"by more than half a line ({agreed.farthest_mm:.2f} mm at the worst), {100 * agreed.unsupported:.2f} % hang in air, "
-        f"and {100 * agreed.reported:.2f} % do so where the file marks an overhang or a bridge"
+        f"the beads fill {percent(agreed.filled, 1)} % of the model; of their length {percent(agreed.outside, 2)} % lie outside "
+        f"it by more than half a line ({amount(agreed.farthest_mm)} mm at the worst), {percent(agreed.unsupported, 2)} % hang in "
+        f"air, and {percent(agreed.reported, 2)} % do so where the file marks an overhang or a bridge"
     )
     return "\n".join(wrap(sentence, WIDEST, subsequent_indent="  ")) + "\n"
 

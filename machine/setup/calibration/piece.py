@@ -48,8 +48,12 @@ TEMPLATE = Path(__file__).parent / "piece.html"
 
 @dataclass(frozen=True, eq=False)
 class Pad:
-    """A pad. number: of its holes; pose: in which it was printed; middle_mm: centre of its underside; ways: (3, 3) unit vectors
-    right, up and away from its roof; both in the workpiece frame."""
+    """A small plate on a roof of the calibration piece, whose offset is measured.
+
+    number: number of holes in the pad, by which the user recognises it; pose: pose in which the pad was printed; middle_mm: (3,)
+    centre of its underside, workpiece frame; ways: (3, 3) unit vectors to the right, upwards and away from its roof, workpiece
+    frame.
+    """
 
     number: int
     pose: Pose
@@ -59,14 +63,17 @@ class Pad:
 
 @dataclass(frozen=True, eq=False)
 class Piece:
-    """A printed piece: the machine of its program, the pose of its roofs, its pads in order."""
+    """A printed calibration piece.
+
+    machine: the machine for which the G-code was made; base: pose in which the roofs were printed; pads: by ascending number.
+    """
 
     machine: Machine
     base: Pose
     pads: tuple[Pad, ...]
 
     def laid_aside_mm(self, true: Machine) -> Floats:
-        """(pads, 3) offset of each pad from its nominal place, along its `ways`, if the machine is truly another one."""
+        """(pads, 3) offset of each pad from its nominal place, along its `ways`, if the real axes are those of `true`."""
         errors = [self._error_mm(true, pad, pad.pose) - self._error_mm(true, pad, self.base) for pad in self.pads]
         return np.array([pad.ways @ error for pad, error in zip(self.pads, errors, strict=True)])
 
@@ -81,7 +88,7 @@ class Piece:
 
 
 def read_piece(program: ParsedProgram, machine: Machine, name: str) -> Piece:
-    """The piece of a program made for a machine. Raises ProfileError for a program of another model."""
+    """The calibration piece that a G-code program prints on a machine. Raises ProfileError for a program of another model."""
     poses, middles = _laid(program, machine)
     if sorted(poses) != list(range(1, PADS + 2)):
         raise ProfileError(f"{name} prints {len(poses)} parts: a program of demo:calibration has {PADS + 1}")

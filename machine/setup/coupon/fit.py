@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 import tomlkit
 
+from machine.quantities import amount, percent
 from machine.setup.coupon.bars import Shape
 from machine.setup.coupon.design import JOINTS, KINDS, Factor, Sheet, settings_in_words, signs
 from profiles.errors import ProfileError
@@ -131,17 +132,17 @@ def _t_of(beyond: float, freedom: int) -> float:
 
 def outcome_text(outcome: Outcome) -> str:
     """Strengths, effects and scatter for the terminal."""
-    lines = [f"{name}: {mpa:.1f} MPa{share}" for name, mpa, share in _strengths(outcome)]
+    lines = [f"{name}: {amount(mpa, 1)} MPa{share}" for name, mpa, share in _strengths(outcome)]
     lines += [f"{_setting(effect)}: {_verdict(effect)}" for effect in outcome.effects]
-    lines.append(f"scatter: {100 * outcome.scatter:.1f} % of a bar's strength, from {outcome.loads} loads")
+    lines.append(f"scatter: {percent(outcome.scatter, 1)} % of a bar's strength, from {outcome.loads} loads")
     return "\n".join(lines) + "\n"
 
 
 def report_lines(sheet: Sheet, outcome: Outcome, version: str) -> list[str]:
     """Markdown report: what was printed and how it broke, strengths, effects, every bar."""
     how = {"machine": sheet.machine, "material": sheet.material, "process": sheet.process, "bars": bars_in_words(sheet.shape)}
-    how |= {"loads": str(outcome.loads), "scatter": f"{100 * outcome.scatter:.1f} %", "tiltprint": version}
-    strengths = [(name, f"{mpa:.1f}", share.strip(" ,")) for name, mpa, share in _strengths(outcome)]
+    how |= {"loads": str(outcome.loads), "scatter": f"{percent(outcome.scatter, 1)} %", "tiltprint": version}
+    strengths = [(name, amount(mpa, 1), share.strip(" ,")) for name, mpa, share in _strengths(outcome)]
     lines = [f"# Joints: {sheet.material} on {sheet.machine}", "", *_table(["what", "value"], list(how.items()))]
     lines += ["", *_table(["strength", "MPa", "of one piece upright"], strengths)]
     effects = []
@@ -153,7 +154,7 @@ def report_lines(sheet: Sheet, outcome: Outcome, version: str) -> list[str]:
     for bar, loads in enumerate(sheet.loads_n, start=1):
         known = [load for load in loads if not isnan(load)]
         loads_n = ", ".join(f"{load:g}" for load in known)
-        mpa = ", ".join(f"{sheet.shape.strength_mpa(load):.1f}" for load in known)
+        mpa = ", ".join(amount(sheet.shape.strength_mpa(load), 1) for load in known)
         bars.append((str(bar), settings_in_words(sheet, bar), loads_n, mpa))
     return [*lines, *_table(["bar", "printed", "broke at N", "MPa"], bars)]
 

@@ -182,14 +182,13 @@ export function onKeys(keys, closed) {
   });
 }
 
-export const mm2 = (area) => `${area < 99.95 ? Math.max(area, 0).toFixed(1) : Number(area.toPrecision(3))} mm²`;
+/** A measure with at most three significant digits and at most `most` decimals: 9.45, 20.7, 125, 1230. */
+export const threeDigits = (value, most = 2, rounded = Number(value.toPrecision(3))) => rounded.toFixed(rounded && Math.log10(Math.abs(rounded)) >= 2 - most ? Math.max(0, 2 - Math.floor(Math.log10(Math.abs(rounded)))) : most);
+export const mm2 = (area) => `${threeDigits(Math.max(area, 0), 1)} mm²`;
 export const clock = (seconds, form = {}) => new Date(1000 * seconds).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", ...form });
 
 /** A time of today, or a date and a time. */
-export function moment(seconds) {
-  const at = new Date(1000 * seconds);
-  return at.toDateString() === new Date().toDateString() ? clock(seconds) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" });
-}
+export const moment = (seconds, at = new Date(1000 * seconds)) => (at.toDateString() === new Date().toDateString() ? clock(seconds) : at.toLocaleString([], { dateStyle: "medium", timeStyle: "short" }));
 
 /** Set a field's value, except while the user types in it, unless the field is new. */
 export const fill = (field, value, anew = false) => { if (anew || document.activeElement !== field) field.value = value; };

@@ -24,7 +24,7 @@ from machine.printing.history import past_prints
 from machine.printing.job import PrintJob
 from machine.printing.journal_folder import ResumableJournal, resumable_journals
 from machine.printing.ports import answer_words, ask_ports, known_ports, port_json
-from machine.quantities import about
+from machine.quantities import about, amount
 from machine.workbench.printing.running_print import RunningPrint
 from machine.workbench.session.base import Observable
 from profiles.errors import OutputError, PrinterError
@@ -208,7 +208,7 @@ def _same(a: Destination, b: Destination) -> bool:
 def past_row(past: dict[str, Any]) -> dict[str, Any]:
     """Name, outcome, time and filament of a past print as texts, and its start, which a browser shows in its own time zone."""
     seconds, metres = past["seconds"], past["filament_m"]
-    time, filament = "–" if seconds is None else about(seconds), "–" if metres is None else f"{metres:.1f} m"
+    time, filament = "–" if seconds is None else about(seconds), "–" if metres is None else f"{amount(metres, 1)} m"
     return {"cells": [past["name"], past["outcome"], time, filament], "begun": past["begun"]}
 
 

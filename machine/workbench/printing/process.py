@@ -21,7 +21,7 @@ from machine.printing.job import NOT_BEGUN, Does, End, PrintJob
 from machine.printing.printers import check_print, open_printer, open_server_printer
 from machine.printing.resumption import print_rest, read_resumption, rest_of
 from machine.printing.server_print import ServerPrinter, file_name, running_print
-from machine.quantities import duration, filament_g, price_in_words
+from machine.quantities import amount, duration, filament_g, price_in_words
 from machine.workbench.printing.at_hand import by_hand
 from machine.workbench.printing.at_page import AtPage, StateReporter, first_state
 from mdp.kernels.workers import listen, read_frames, redirect_stdio
@@ -110,8 +110,8 @@ def figures(loaded: LoadedProgram) -> dict[str, Any]:
     program, material = loaded.program, loaded.profile.material
     values, findings, errors = summary(program.run), program.run.findings, len(program.run.errors)
     mm = values["filament_mm"]
-    weight = ", ".join(filter(None, (f"{filament_g(mm, material):.1f} g", price_in_words(mm, material))))
-    text = f"{len(program.lines)} lines, {duration(values['time_s'])}, {mm / 1000.0:.2f} m ({weight}) of filament"
+    weight = ", ".join(filter(None, (f"{amount(filament_g(mm, material), 1)} g", price_in_words(mm, material))))
+    text = f"{len(program.lines)} lines, {duration(values['time_s'])}, {amount(mm / 1000.0)} m ({weight}) of filament"
     if errors:
         text += f", {errors} error{'s' * (errors > 1)} in the dry run"
     return {"text": text, "findings": [f"{finding.severity}: {finding.message}" for finding in findings[:MOST_FINDINGS]]}

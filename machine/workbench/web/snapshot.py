@@ -92,7 +92,7 @@ def _figures(alternative: Alternative, material: Material) -> list[tuple[str, st
         "time": about(alternative.time_s or 0.0),
         "plastic": f"{amount(filament_g(mm, material), 1)} g",
         "costs": price_in_words(mm, material),
-        "support": f"{support_mm3 / 1000.0:.2f} cm³",
+        "support": f"{amount(support_mm3 / 1000.0)} cm³",
         "support marks": _mm2(alternative.risky_mm2),
         "seams between parts": f"{amount(alternative.seam_mm, 0)} mm",
         "stair-stepping": _mm2(alternative.stairs_mm2),
@@ -156,7 +156,7 @@ def _gcode(session: Session) -> dict[str, Any] | None:
     profile, note = file.known.profile, file.cost.message
     tried = f"; {note}, so it was tried for {profile.machine.name} as under Settings" if note else ""
     verdict = verdict_of(file.findings, profile, 0.0, out_of_date=False)["text"].removesuffix(" below")
-    figures = f"{duration(file.time_s)}, {file.filament_mm / 1000.0:.2f} m of filament"
+    figures = f"{duration(file.time_s)}, {amount(file.filament_mm / 1000.0)} m of filament"
     return {"key": file.key, "name": file.cost.name, "told": f"{verdict}; {figures}{tried}"}
 
 
@@ -403,7 +403,7 @@ def _part_figures(bench: Bench, trial: Trial) -> list[list[tuple[str, str]]]:
     cut = [[("seam", f"{amount(part.rim_mm, 0)} mm"), ("cut edge", f"{part.edge_deg:.0f}°")] for part in others]
     whole = [(volume_mm3, support_mm2), *((part.volume_mm3, part.support_mm2) for part in others)]
     return [
-        [("volume", f"{volume / 1000.0:.2f} cm³"), ("support", _mm2(support)), *own]
+        [("volume", f"{amount(volume / 1000.0)} cm³"), ("support", _mm2(support)), *own]
         for (volume, support), own in zip(whole, [[], *cut], strict=True)
     ]
 

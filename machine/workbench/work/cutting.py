@@ -21,7 +21,7 @@ from machine.pipeline.pictures import PLAIN, contact_sheet, front_picture, parts
 from machine.pipeline.project import PICTURE_PX, STANDING, project_bytes, read_folder, with_meshes_beside
 from machine.planning.fit import check_parts
 from machine.planning.stops import check_stop_parts
-from machine.quantities import amount, newtons
+from machine.quantities import amount, newtons, percent
 from machine.view.encoding import pack
 from machine.view.parts import page_colours, part_colours
 from machine.view.scene import solids, surfaces
@@ -102,7 +102,7 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
                 compilers.wait_for(compilers.SEARCH, lambda text, share=None: tell(Searched(text, best)))
                 tell(Searched(f"{otherwise}looking for the first cut along {profile.search.directions:,} directions", best))
                 return
-            left = f"{100 * best_share:.1f} % of the overhangs left"
+            left = f"{percent(best_share, 1)} % of the overhangs left"
             if candidate is mesh:
                 best = measure()  # planes of another orientation do not fit the model in the picture
             tell(Searched(f"{otherwise}trying cut {stage}, {left}", best))
@@ -127,8 +127,11 @@ def find_parts(tell: Tell, bench: Bench, orient: bool = True, ranker: str = CLAS
 
 
 def measure_plan(tell: Tell, bench: Bench, plan: PlanFile, recommended: int = 0) -> tuple[FrontRow, ...]:
-    """The measured front of a plan for the model on the bench. recommended: number of parts that the search preferred. A front
-    that was found stays as it is if the plan's parts have been changed by hand since. Raises PlanError if they cannot be cut."""
+    """The measured front of a plan for the model on the bench. recommended: number of parts that the search preferred.
+
+    The front of a search stays as it is if the plan's parts have been changed by hand since. Raises PlanError if they cannot be
+    cut.
+    """
     found = {row.parts: planned_parts(row) for row in plan.front}
     if found and plan.parts not in found.values():
         cut_bench(bench, replace(plan, front=()))
@@ -244,7 +247,7 @@ def draw_pieces(tell: Tell, bench: Bench, out: Path) -> None:
 
 
 def pieces_block(decomposition: Decomposition, profile: Profile) -> bytes:
-    """Surfaces and figures of all parts in print order, and as `fit` why the machine cannot reach them, in the words of
+    """Surfaces and figures of all parts in print order; under the key `fit`, why the machine cannot reach them, in the words of
     `export`."""
     colours = page_colours(len(decomposition.parts))
     records = solids(decomposition, profile, joints_of(decomposition.parts, profile))

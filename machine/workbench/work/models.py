@@ -34,7 +34,11 @@ FACET_DIGITS = 4  # digits after the point of mm
 
 @dataclass(frozen=True, eq=False)
 class Resting:
-    """A stable orientation: rows of its rotation, its description, overhanging area and height."""
+    """An orientation in which the model rests on a facet of its convex hull without falling over.
+
+    rotation: rows of the (3, 3) rotation matrix; words: description for the user; overhang_mm2: overhanging area in this
+    orientation; height_mm: height of the model in it.
+    """
 
     rotation: tuple[tuple[float, ...], ...]
     words: str
@@ -44,7 +48,10 @@ class Resting:
 
 @dataclass(frozen=True)
 class Unscaled:
-    """A model whose size suggests a wrong unit: see mdp.read.SizeError."""
+    """A model that was not read because its size suggests another unit than mm; see mdp.read.SizeError.
+
+    sentence: what was found; question: question for the user; units: the scale of each unit in question.
+    """
 
     sentence: str
     question: str
@@ -54,7 +61,7 @@ class Unscaled:
 def read_model(
     tell: Tell, path: Path, name: str, profile: Profile, mesh_file: Path, plate: int | None = None
 ) -> Model | Unscaled:
-    """Read a model; messages are those of the command line, with the file's name on the page."""
+    """Read a model file for the workbench. name: name of the file for the user. Raises UserError like the command line."""
     try:
         read = read_model_file(path, profile.process.scale, profile.process.rotate_deg, plate)
     except SizeError as error:

@@ -35,7 +35,7 @@ def test_a_part_larger_than_the_axes_is_refused_before_it_is_sliced(scale: tuple
     [
         (
             [],
-            r"first layer on the plate is 150.0 x 150.0 mm, 5.7 mm over the edge of the plate of .*, 100 mm from its middle: ",
+            r"first layer on the plate is 150 x 150 mm, 5.7 mm over the edge of the plate of .*, 100 mm from its middle: ",
         ),
         (["machine.table.size_mm=[150, 149]"], r"0.3 mm over the edge of the plate of .*, it measures 150 x 149 mm"),
     ],

@@ -72,7 +72,7 @@ def test_areas_are_compared_at_no_cost_and_alternatives_where_they_are_known() -
     program = example()[1]
     areas = tables(program)["Compared"]
     assert [row[0] for row in areas["rows"]] == ["straight up", "best single orientation", "in 2 parts"]
-    assert areas["rows"][2] == ["in 2 parts", "0.0", "100.0 %"]
+    assert areas["rows"][2] == ["in 2 parts", "0.0", "100 %"]
     alternatives = (
         Alternative(
             "in 2 parts", "", 2, 60.0, 1000.0, 3.0, 0.0, 0.0, seam_mm=43.7, stairs_mm2=12.4, interface_mm3={2: 170.0}, findings=2
@@ -82,7 +82,7 @@ def test_areas_are_compared_at_no_cost_and_alternatives_where_they_are_known() -
     known = tables(program, alternatives)["Compared"]
     assert known["head"] == ["", "in 2 parts", "straight up"]
     assert [row[1] for row in known["rows"]] == ["1m 0s", "1.00", "3.0", "0.00", "0.17", "44", "12", "2", "0.0"]
-    assert [row[2] for row in known["rows"]] == ["-"] * 8 + ["100.0"]
+    assert [row[2] for row in known["rows"]] == ["-"] * 8 + ["100"]
     assert known["notes"] == ["straight up: too high"]
 
 

@@ -21,7 +21,7 @@ AS_IT_IS, WORKED_OUT, LEFT = "taken as it is", "computed", "left"
 
 
 def import_profiles(request: ImportRequest) -> int:
-    """Write the material and the process of a file, and list what became of each setting."""
+    """Write the material and the process of a file, and report for each setting whether and how it was imported."""
     presets = {"process": request.process, "material": request.material, "printer": request.printer}
     if request.out is not None:
         check_folder(request.out)

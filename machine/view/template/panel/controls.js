@@ -1,6 +1,6 @@
 // Controls: colouring, visibility, the legend, and the theme.
 
-import { $, duration, keptIn, listen, made, numberIn, optionsOf, partsInWords, swatch, swatches, tabsOf, tell, toggle } from "../elements.js";
+import { $, duration, keptIn, listen, made, numberIn, optionsOf, partsInWords, swatch, swatches, tabsOf, tell, threeDigits, toggle } from "../elements.js";
 import { RAMP, TRAVELS, typeColour } from "../moves/colours.js";
 import { KIND } from "../moves/rows.js";
 import { mix } from "../picture/math.js";
@@ -47,7 +47,7 @@ function typeBoxes({ rows }, scene, bells) {
   rows.types.forEach((name, place) => {
     if (!seconds[place]) return;
     const onchange = ({ target }) => { scene.hidden[target.checked ? "delete" : "add"](place); bells.ring("colours"); };
-    const share = made("span", { className: "share", text: `${((100 * seconds[place]) / whole).toFixed(1)} %` });
+    const share = made("span", { className: "share", text: `${threeDigits((100 * seconds[place]) / whole, 1)} %` });
     $("types").append(made("label", {}, made("input", { type: "checkbox", checked: true, onchange }), swatch(typeColour(name)), name || "unknown", share));
   });
 }

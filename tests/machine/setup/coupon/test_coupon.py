@@ -62,7 +62,7 @@ def test_a_simulated_print_leads_from_the_program_to_own_profiles(capsys: pytest
     assert main(["print", "coupon.gcode", "--port", "sim", "--sim-speed", "0"]) == 0
     laid = re.search(r"([\d.]+) cm³ of plastic laid \(planned ([\d.]+)\), heaters off", "".join(capsys.readouterr()))
     assert laid is not None
-    assert float(laid[1]) == pytest.approx(float(laid[2]), rel=1e-3)
+    assert float(laid[1]) == pytest.approx(float(laid[2]), rel=1e-2)
 
     empty = read_sheet(Path("coupon.toml"))
     assert (empty.machine, empty.material, empty.process, empty.factors) == (*NAMES, FACTORS)

@@ -1,6 +1,6 @@
 // Benches: several models at once, on one plate or each on a bench and in a page of its own; autosaved work and files of earlier runs; and paired devices.
 
-import { $, button, clock, hide, listen, made, moment, notice, partsInWords, putRows, removeButton, sayIn, tell } from "../../../../view/template/elements.js";
+import { $, button, clock, hide, listen, made, moment, notice, partsInWords, putRows, removeButton, sayIn, tell, threeDigits } from "../../../../view/template/elements.js";
 import { lineAt, OWN_PAGE, send } from "../line.js";
 import { onNew, onState } from "../store.js";
 
@@ -38,7 +38,7 @@ const sendFile = (file, how = {}, to = "") => new Promise((answered) => {
 });
 
 function upload(file, how, to, sent, answered) {
-  const request = new XMLHttpRequest(), mb = (bytes) => (bytes / 1e6).toFixed(1);
+  const request = new XMLHttpRequest(), mb = (bytes) => threeDigits(bytes / 1e6, 1);
   request.upload.onprogress = ({ loaded, total }) => {
     hide({ sending: false });
     Object.assign($("sending-bar"), { value: loaded, max: total });

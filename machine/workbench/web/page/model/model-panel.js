@@ -1,6 +1,6 @@
 // Model panel: file, orientation, overhangs, size, and positions of the model and its copies on the plate.
 
-import { $, alike, button, fill, hide, listen, listIn, mm2, numberIn, onData, putAt, putNew, sayIn, tell, tellIn } from "../../../../view/template/elements.js";
+import { $, alike, button, fill, hide, listen, listIn, mm2, numberIn, onData, putAt, putNew, sayIn, tell, tellIn, threeDigits } from "../../../../view/template/elements.js";
 import { add, sub } from "../../../../view/template/picture/math.js";
 import { ask, send } from "../line.js";
 import { gripOf } from "../scene/grip.js";
@@ -42,7 +42,7 @@ export function modelPanel() {
   subscribe(({ state: { model, standing } }) => {
     if (model) tellIn("model-told", [
       ["name", model.name], ["faces", model.faces.toLocaleString("en")],
-      ["size", `${modelSize({ standing, model }).map((x) => x.toFixed(1)).join(" × ")} mm`], ["volume", `${(model.volume_mm3 / 1000).toFixed(2)} cm³`],
+      ["size", `${modelSize({ standing, model }).map((x) => threeDigits(x, 1)).join(" × ")} mm`], ["volume", `${threeDigits(model.volume_mm3 / 1000)} cm³`],
     ]);
   });
 }

@@ -1,6 +1,6 @@
 // Marks: boxes and faces that the user marks: drawn in the picture in the colour of their kind, listed, moved by handles and numbers.
 
-import { $, alike, fill, listen, made, numberIn, putAt, putTable, removeButton, rowOf, swatch, tell } from "../../../../view/template/elements.js";
+import { $, alike, fill, listen, made, numberIn, putAt, putTable, removeButton, rowOf, swatch, tell, threeDigits } from "../../../../view/template/elements.js";
 import { add, bounds, scaled } from "../../../../view/template/picture/math.js";
 import { boxCorners, boxEdges, trianglesOf, wordOf } from "../../../../view/template/picture/shapes.js";
 import { newest, send } from "../line.js";
@@ -157,7 +157,7 @@ const modifierRow = ({ settings }) => made("tr", {}, made("td", {}, swatch(`rgb(
 function markRow(zone, chosen) {
   const { word, colour } = MARK_KINDS[zone.kind], name = `${word} ${zone.number}`;
   const remove = removeButton(`Remove ${name}`, () => send({ do: "unmark", kind: zone.kind, number: zone.number }));
-  const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => (zone.max_mm[k] - x).toFixed(1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
+  const where = zone.min_mm ? `box ${zone.min_mm.map((x, k) => threeDigits(zone.max_mm[k] - x, 1)).join(" × ")} mm${zone.axes ? ", leaning" : ""}`
     : zone.point_mm ? `faces up to ${Number(zone.angle_deg.toFixed(1))}°` : zone.faces ? `${zone.faces.toLocaleString("en")} faces` : `faces of #${zone.colour.toString(16).padStart(6, "0")}`;
   const mark = made("input", { type: "radio", name: "mark", value: `${zone.kind} ${zone.number}`, checked: chosen, ariaLabel: name, onchange: () => chooseMark(zone) });
   return rowOf([made("label", {}, mark, swatch(`rgb(${colour})`), word), where, remove]);

@@ -1,6 +1,6 @@
 // Planes: those shown, from the bench or being dragged: their panel, the handles in the picture, and the obstacles of a rejected one.
 
-import { $, alike, disable, fill, hide, listen, mm2, numberIn, onData, pressed, putAt, tell } from "../../../../view/template/elements.js";
+import { $, alike, disable, fill, hide, listen, mm2, numberIn, onData, pressed, putAt, tell, threeDigits } from "../../../../view/template/elements.js";
 import { add, clamp, cornersOf, cross, dot, length, RAD, rotated, scaled, sub, turned, unit } from "../../../../view/template/picture/math.js";
 import { beside, boxesOf, chained, circle, headOf, RED, trianglesOf } from "../../../../view/template/picture/shapes.js";
 import { ask, send } from "../line.js";
@@ -250,7 +250,7 @@ function tellAll() {
   }
   $("plane-told").className = why ? "refused" : invalid && "invalid";
   const told = why ? why : invalid && !store.hand ? `Cannot be cut off here: ${invalid}.` : !figures || !cuts.length ? ""
-    : `${mm2(figures.support_area_mm2)} to support, ${figures.seam_mm.toFixed(0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
+    : `${mm2(figures.support_area_mm2)} to support, ${threeDigits(figures.seam_mm, 0)} mm of seams${figures.unchecked ? "; looking at the parts printed before it …" : ""}`;
   tell({ "plane-told": told, "plane-name": `Part ${part}`, "plane-of": `Plane of part ${part}`, unsliceable: unsliceable ? `Cannot be sliced: ${unsliceable}.` : "" });
 }
 
