@@ -7,7 +7,7 @@
 import { made, notice } from "../../../view/template/elements.js";
 import { keptInTab } from "./store.js";
 
-export const AGAIN_MS = 1000, SAVED_MS = 6000; // delay before reconnecting, and duration of the notice about a saved file
+const AGAIN_MS = 1000, SAVED_MS = 6000; // delay before reconnecting, and duration of the notice about a saved file
 const SILENT_MS = 1500, LATE_MS = 200; // time without a beat (two a second are sent), and until a received message is handled where the page itself was busy
 const ENDINGS = { 4404: "closed", 4403: "unpaired" }; // by the code with which the server closes a connection: its bench is closed, its device unpaired
 const NOT_SENT = "the line to tiltprint is lost, so this was not done";
@@ -88,17 +88,20 @@ export function ask(command, answered) {
   send({ ...command, ask: name });
 }
 
-/** A function of a key and its address that passes the fetched content to take(), for the latest request only; null if the key is empty. insists: retry missing content, as after a lost connection; begin(): called before a request. */
+/** A function of a key and its address that passes the fetched content to take(), for the latest request only, even among those of one key, whose answers may overtake each other; null if the key is empty. insists: request missing content again; begin(): called before the first request. */
 export function newest({ read, take, insists = false, begin = () => {} }) {
-  let asked = "";
-  return async (key, address) => {
+  let asked = "", count = 0;
+  const request = async (key, address) => {
+    const number = ++count, answer = key ? await fetch(address).catch(() => null) : null, content = answer?.status === 200 ? await read(answer) : null;
+    if (number !== count) return;
+    if (key && !content && (insists || !answer)) setTimeout(() => { if (number === count) request(key, address); }, AGAIN_MS);
+    take(content, key);
+  };
+  return (key, address) => {
     if (key === asked) return;
     asked = key;
     begin();
-    const answer = key ? await fetch(address).catch(() => null) : null, content = answer?.status === 200 ? await read(answer) : null;
-    if (asked !== key) return;
-    if (!answer || (insists && !content)) asked = "";
-    take(content, key);
+    return request(key, address);
   };
 }
 

@@ -22,11 +22,10 @@ import { keptLook, onNew, onState, store, subscribe, update } from "./store.js";
 function main() {
   const camera = cameraOf(), picture = pictureOf($("canvas"), camera), root = document.documentElement;
   themeSwitch((dark) => update({ dark }));
-  const fetchModel = modelFetcher(picture, () => follow(store.state));
+  const fetchModel = modelFetcher(picture, () => restoreLook());
   const follow = async (state) => {
     update({ state, turning: null });
     await fetchModel(state.model);
-    restoreLook();
     if (store.state.version === state.version) root.dataset.version = state.version;
   };
   openLine(follow, (how) => {

@@ -3,7 +3,7 @@
 import { $, alike, button, hide, made, mm2, notice, swatches, tell } from "../../../../view/template/elements.js";
 import { add, scaled, sub } from "../../../../view/template/picture/math.js";
 import { trianglesOf } from "../../../../view/template/picture/shapes.js";
-import { AGAIN_MS, newest, send } from "../line.js";
+import { newest, send } from "../line.js";
 import { fadedColours } from "../parts/pieces.js";
 import { planesNow } from "../parts/planes.js";
 import { cornersAt, faceMet } from "../scene/face-tree.js";
@@ -12,8 +12,8 @@ import { onState, store, subscribe, update } from "../store.js";
 
 const MANY_FACES = 100000; // fetching and drawing more takes a moment, so a message is shown
 
-/** Return a function that fetches a model's triangles when they differ from the loaded ones; again(): fetch once more. */
-export function modelFetcher(picture, again) {
+/** Return a function that fetches a model's triangles when they differ from the loaded ones; shown(): called when they are drawn. */
+export function modelFetcher(picture, shown) {
   const begin = () => {
     const faces = store.state.model?.faces || 0;
     notice(faces > MANY_FACES ? `${faces.toLocaleString("en")} faces are on their way into the picture …` : "", "model");
@@ -21,11 +21,11 @@ export function modelFetcher(picture, again) {
   };
   const take = (triangles, key) => {
     const missing = key && !triangles;
-    if (missing) setTimeout(again, AGAIN_MS);
     notice(missing ? "The model has not come from tiltprint, so it is not drawn yet; it is requested again." : "", "model");
     picture?.show(triangles);
     update({ triangles });
     picture?.fit();
+    shown();
     document.documentElement.dataset.shown = missing ? "" : key;
   };
   const fetchTriangles = newest({ read: async (answer) => trianglesFrom(await answer.arrayBuffer()), take, insists: true, begin });
