@@ -87,8 +87,8 @@ def check_standing(mesh: Mesh, profile: Profile) -> None:
     if over_mm > ROUNDING:
         x, y = np.ptp(standing, axis=0)
         raise MoveError(
-            f"the first layer on the plate is {amount(x, 1)} x {amount(y, 1)} mm, {amount(over_mm, 1)} mm over the edge of the plate "
-            f"of {machine.name}, {edge}: {_advice(profile)}"
+            f"the first layer on the plate is {amount(x, 1)} x {amount(y, 1)} mm, {amount(over_mm, 1)} mm over the edge of the "
+            f"plate of {machine.name}, {edge}: {_advice(profile)}"
         )
 
 

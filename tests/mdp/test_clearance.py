@@ -61,7 +61,7 @@ def test_no_pose_is_allowed_at_which_the_head_meets_a_clip_that_turns_with_the_p
     assert not any(meet(machine, pose) for pose in allowed_poses(machine, LEANING, PART))
 
 
-def test_a_low_clip_far_out_leaves_both_poses_and_one_beside_the_part_is_named() -> None:
+def test_a_distant_low_clip_blocks_no_pose_and_one_next_to_the_part_is_named() -> None:
     assert len(allowed_poses(with_clip(80.0, 6.0), LEANING, PART)) == 2
     reason = find_obstacle(with_clip(10.0, 40.0), Pose(0.0, 0.0), PART)
     assert reason == "the head's hot end would meet the plate's clip"
@@ -74,7 +74,7 @@ def test_a_post_beside_the_part_would_collide_in_every_pose() -> None:
 
 
 @pytest.mark.parametrize(("height", "count"), [(5.0, 2), (200.0, 0)])
-def test_a_low_post_far_out_leaves_both_poses_and_a_tall_one_beside_the_part_none(height: float, count: int) -> None:
+def test_a_distant_low_post_blocks_no_pose_and_a_tall_one_next_to_the_part_blocks_both(height: float, count: int) -> None:
     free = len(allowed_poses(MACHINE.model_copy(update={"cradle": []}), LEANING, PART))
     beside = with_post(MACHINE, 110.0 if height < 100 else 10.0, height)
     assert (free, len(allowed_poses(beside, LEANING, PART))) == (2, count)

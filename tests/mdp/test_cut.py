@@ -28,7 +28,7 @@ def test_the_halves_are_those_that_one_split_makes(seed: int, height: int, aroun
         assert mine.surface_area() == pytest.approx(split_half.surface_area(), rel=1e-9, abs=1e-6)
 
 
-def test_a_plane_beside_the_solid_leaves_one_half_empty() -> None:
+def test_a_plane_outside_the_solid_leaves_one_half_empty() -> None:
     whole, over = solid_of(shapes.box()), Plane(np.array([0.0, 0.0, 1.0]), 1000.0)
     assert above(whole, over).is_empty()
     assert below(whole, over).volume() == pytest.approx(whole.volume())

@@ -79,7 +79,7 @@ def test_a_part_printed_level_keeps_the_turn_of_the_part_before() -> None:
     assert [pose.turn_deg for pose in least_rotation(wound(), options)] == [0.0, 80.0, 80.0, 90.0]
 
 
-def test_a_part_printed_level_turns_where_the_kept_turn_does_not_fit() -> None:
+def test_a_part_printed_level_turns_if_the_kept_turn_does_not_fit() -> None:
     options = [[Pose(0.0, 0.0)], [Pose(30.0, 80.0)], [Pose(0.0, 0.0)], [Pose(30.0, 90.0)]]
     chosen = least_rotation(wound(), options, lambda part, pose: part != 2)
     assert [pose.turn_deg for pose in chosen] == [0.0, 80.0, 0.0, 90.0]

@@ -33,7 +33,7 @@ def test_a_face_with_a_point_in_the_zone_is_touched(seed: int, low: tuple[float,
     assert (zone.faces(mesh) >= inside).all()
 
 
-def test_a_face_whose_box_reaches_into_the_zone_but_not_itself_is_not_touched() -> None:
+def test_a_face_is_not_touched_if_only_its_bounding_box_reaches_into_the_zone() -> None:
     mesh = Mesh(
         np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0], [0, 0, 10]]), np.array([[0, 2, 1], [1, 2, 3], [0, 1, 3], [0, 3, 2]])
     )

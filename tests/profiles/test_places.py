@@ -25,14 +25,14 @@ def keep(kind: str, name: str, text: str) -> Path:
     return own_folder(kind) / f"{name}.toml"
 
 
-def test_the_folder_is_where_the_platform_keeps_settings(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_profiles_are_in_the_settings_folder_of_the_operating_system(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert own_folder("machine") == folder / "tiltprint" / "profiles" / "machines"
     monkeypatch.delenv("XDG_CONFIG_HOME")
     monkeypatch.setattr("sys.platform", "linux")
     assert own_folder("material") == Path(os.path.expanduser("~")) / ".config" / "tiltprint" / "profiles" / "materials"
 
 
-def test_without_own_profiles_only_the_shipped_ones_are_known() -> None:
+def test_without_user_profiles_only_the_shipped_ones_are_known() -> None:
     assert [own(kind) for kind in ("machine", "material", "process")] == [[], [], []]
     assert known("machine") == shipped("machine")
 
@@ -51,7 +51,7 @@ def test_an_own_profile_replaces_the_shipped_one_it_inherits() -> None:
     assert known("machine").count("gen5x") == 1
 
 
-def test_an_own_material_and_process_inherit_from_shipped_and_own_ones() -> None:
+def test_user_materials_inherit_from_shipped_and_user_materials() -> None:
     keep("material", "shop", 'inherits = "petg"\n[material]\nflow = 0.97\n')
     keep("material", "shop_red", 'inherits = "shop"\n[material]\nnozzle_c = 231\n')
     material = load(material="shop_red").material
@@ -68,7 +68,7 @@ def test_the_shipped_base_of_a_profile_is_found_through_own_ones() -> None:
     assert [shipped_base("material", name) for name in names] == ["petg", "petg", "petg", None, None, None]
 
 
-def test_own_profiles_that_inherit_each_other_are_refused() -> None:
+def test_user_profiles_that_inherit_each_other_are_refused() -> None:
     keep("machine", "a", 'inherits = "b"\n[machine]\nlift_mm = 1\n')
     keep("machine", "b", 'inherits = "a"\n[machine]\nlift_mm = 1\n')
     with pytest.raises(ProfileError, match="a inherits itself through"):

@@ -324,7 +324,7 @@ def test_a_file_inherits_what_it_does_not_say(tmp_path: Path) -> None:
     assert load(process=file).search.beam_width == 9
 
 
-def test_a_file_inherits_from_a_file_beside_it(tmp_path: Path) -> None:
+def test_a_file_inherits_from_a_file_in_its_folder(tmp_path: Path) -> None:
     written(tmp_path, 'inherits = "pla"\n[material]\nfan = 0.25\nflow = 0.9\n', "base.toml")
     material = load(material=written(tmp_path, 'inherits = "base.toml"\n[material]\nflow = 1.1\n')).material
     assert (material.fan, material.flow, material.bed_c) == (0.25, 1.1, 60.0)

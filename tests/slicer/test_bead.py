@@ -32,7 +32,7 @@ def test_first_layer_beads_have_one_width_on_the_plate_and_another_on_plastic() 
 
 
 @pytest.mark.parametrize("width", [0.3, 0.7])
-def test_an_outer_wall_runs_half_its_own_width_inside(width: float) -> None:
+def test_an_outer_wall_is_inset_by_half_its_width(width: float) -> None:
     sliced = slice_part(whole(box(20, 20, 1)), profile(f"process.outer_wall_line_width_mm={width}"))
     points = np.concatenate([path.points for path in of_kind(sliced, Kind.OUTER_WALL)])
     assert np.abs(points).max() == pytest.approx(10 - 0.5 * width)

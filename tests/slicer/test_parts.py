@@ -125,6 +125,6 @@ room_of(parts[1])
 """
 
 
-def test_nothing_is_printed_when_python_ends() -> None:
+def test_python_exits_without_output() -> None:
     done = subprocess.run([sys.executable, "-c", ENDING], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == ("", "")

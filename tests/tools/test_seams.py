@@ -25,7 +25,7 @@ def counted(lines: list[str], profile: Profile) -> list[str]:
     return [mark.what for outline in outlines if outline.part == 2 for mark in seams.marks(program, outline)]
 
 
-def test_nothing_is_left_on_the_rim_of_a_box_cut_askew(printed: tuple[tuple[str, ...], Profile]) -> None:
+def test_an_oblique_cut_through_a_box_leaves_no_marks_on_its_rim(printed: tuple[tuple[str, ...], Profile]) -> None:
     lines, profile = printed
     assert counted(list(lines), profile) == []
 

@@ -1,4 +1,4 @@
-"""Content that the page fetches by a key, as the marks on a model: the latest answer counts, and a missing one is asked for again."""
+"""Content that the page fetches by a key, as the marks on a model: the latest answer counts, a missing one is requested again."""
 
 from machine.workbench.web.server import OWN
 from tests.machine.fake_page import needs_node, on_fake_page
@@ -6,8 +6,10 @@ from tests.machine.fake_page import needs_node, on_fake_page
 # Requests wait in `asked` until the test answers them.
 FETCHED = """
     const asked = [], taken = [], later = () => new Promise((done) => setImmediate(done));
-    globalThis.fetch = (address) => new Promise((answer) => asked.push((status) => answer({ status, text: async () => address })));
-    const fetchMarks = modules["page/line"].newest({ read: (answer) => answer.text(), take: (text) => taken.push(text), insists: true });
+    const answerOf = (address, status) => ({ status, text: async () => address });
+    globalThis.fetch = (address) => new Promise((answer) => asked.push((status) => answer(answerOf(address, status))));
+    const read = (answer) => answer.text(), take = (text) => taken.push(text);
+    const fetchMarks = modules["page/line"].newest({ read, take, insists: true });
     const answered = async (number, status) => { asked[number](status); await later(); };
 """
 

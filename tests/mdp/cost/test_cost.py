@@ -89,7 +89,7 @@ def test_a_face_that_an_earlier_cut_laid_open_carries_no_seam() -> None:
     assert _seam(places, below(whole, first), second).length_mm == pytest.approx(10.0 + 10.0)
 
 
-def test_a_seam_along_a_crease_counts_less_than_beside_it() -> None:
+def test_a_seam_along_a_crease_counts_less_than_one_away_from_it() -> None:
     places, branch = _places(shapes.tee(), hidden_share=0.4)  # a bar on a stem; its underside is at 30 mm
     crease, stem = (_seam(places, branch, Plane(np.array([0.0, 0.0, 1.0]), z)) for z in (29.9, 15.0))
     assert crease.length_mm == stem.length_mm == pytest.approx(40.0)

@@ -62,7 +62,7 @@ def test_the_forecast_is_what_cutting_leaves(leans: list[tuple[float, float, flo
     assert _surface(shape()).left_mm2(planes) == pytest.approx(_cut_and_summed(shape(), planes), abs=1e-6)
 
 
-def test_without_planes_it_is_the_risky_area_upright() -> None:
+def test_without_planes_the_forecast_is_the_risky_area_of_the_upright_model() -> None:
     assert _surface(shapes.tee()).left_mm2([]) == pytest.approx(300.0)  # the undersides of a 40 x 10 bar on a 10 x 10 stem
 
 

@@ -36,6 +36,6 @@ def test_mirroring_a_plane_twice_gives_it_back() -> None:
     assert mirror.upright(upright, middle) is None  # already equal to its own image
 
 
-def test_nothing_mirrors_a_model_without_symmetry() -> None:
+def test_a_model_without_symmetry_has_no_mirror_planes() -> None:
     bent = m3.Manifold.cube((30, 8, 5)) + m3.Manifold.cube((8, 20, 5)) + m3.Manifold.cube((5, 5, 25)).translate((20, 0, 0))
     assert find_mirrors(shapes.standing(bent)) == []

@@ -172,7 +172,7 @@ def test_an_iges_file_that_was_cut_off_is_said_to_be_cut_short(tmp_path: Path) -
     assert sentence == "is cut short: its last section (T, terminate) is missing"
 
 
-def test_without_the_extra_the_sentence_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_cad_library_is_reported_with_the_install_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "cascadio", None)
     sentence = refusal(save(tmp_path / "box.step", step_box((20, 30, 40)).encode()))
     assert sentence == "reading CAD files needs cascadio: pip install 'tiltprint[step]'"

@@ -60,7 +60,7 @@ def test_the_colours_of_materials_are_kept_as_srgb(tmp_path: Path) -> None:
     assert set(mesh.colours.tolist()) == {0xFF8000, NO_COLOUR}
 
 
-def test_without_a_scene_the_nodes_that_no_other_holds_are_placed(tmp_path: Path) -> None:
+def test_without_a_scene_the_root_nodes_are_placed(tmp_path: Path) -> None:
     mesh, _ = read_mesh(save(tmp_path / "a.glb", _edited(scenes=[], nodes=[{"mesh": 0}, {"children": [0], "scale": [2, 2, 2]}])))
     assert mesh.volume_mm3 == pytest.approx(8000)
 
@@ -128,7 +128,7 @@ def test_strips_and_compressed_geometry_are_refused_and_not_guessed(tmp_path: Pa
 
 
 @pytest.mark.parametrize("mode", [0, 1, 3])
-def test_points_and_lines_beside_a_solid_are_left_out_with_a_note(tmp_path: Path, mode: int) -> None:
+def test_points_and_lines_next_to_a_solid_are_left_out_with_a_note(tmp_path: Path, mode: int) -> None:
     solid, line = ({"attributes": {"POSITION": 1}, "indices": 0}, {"attributes": {"POSITION": 1}, "mode": mode})
     mesh, notes = read_mesh(save(tmp_path / "a.glb", _edited(meshes=[{"primitives": [solid, line]}])))
     assert mesh.volume_mm3 == pytest.approx(1000.0)

@@ -109,12 +109,14 @@ def test_an_invalid_unit_or_axis_is_refused(tmp_path: Path, asset: str, sentence
     assert sentence in refusal(save(tmp_path / "a.dae", dae(asset)))
 
 
-def test_without_its_library_collada_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_collada_library_is_reported_with_the_install_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "collada", None)
     assert refusal(save(tmp_path / "a.dae", dae(""))) == "reading .dae files needs collada: pip install 'tiltprint[dae]'"
 
 
-def test_without_the_extra_the_sentence_says_what_a_dae_file_needs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_import_error_without_a_name_is_reported_with_the_install_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def missing(*given: object, **more: object) -> None:
         raise ImportError("no loader")  # without a name, as trimesh raises it
 

@@ -13,7 +13,7 @@ from tests.shapes import tee
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("inch", 25.4), ("meter", 1000.0), ("centimeter", 10.0), ("foot", 304.8)])
-def test_3mf_brings_its_own_unit(tmp_path: Path, unit: str, factor: float) -> None:
+def test_the_unit_of_a_3mf_is_applied(tmp_path: Path, unit: str, factor: float) -> None:
     box = files.threemf_mesh(files.placed(0.5, 1, 2))
     mesh, _ = read_mesh(files.threemf(tmp_path / "a.3mf", {1: box}, '<item objectid="1"/>', unit))
     assert np.ptp(mesh.bounds_mm, axis=0) == pytest.approx(np.array([0.5, 1, 2]) * factor)

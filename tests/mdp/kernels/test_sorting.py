@@ -47,7 +47,7 @@ def test_a_counting_sort_is_stable_and_knows_where_each_bin_begins(numbers: list
     assert first.tolist() == np.searchsorted(np.sort(keys), np.arange(11)).tolist()
 
 
-def test_an_item_is_in_every_bin_that_it_touches_and_in_none_when_it_touches_none() -> None:
+def test_an_item_is_in_exactly_the_bins_that_it_touches() -> None:
     first, items = sort_into_bins(np.array([0, 1, 2]), np.array([1, 0, 3]), 4)
     assert [items[a:b].tolist() for a, b in pairwise(first)] == [[0], [0], [2], [2]]
 

@@ -83,7 +83,7 @@ def test_an_npz_without_faces_is_refused_by_name(tmp_path: Path) -> None:
         read_model(tmp_path / "a.npz")
 
 
-def test_models_whose_records_would_have_one_name_are_refused(tmp_path: Path) -> None:
+def test_models_with_the_same_record_name_are_refused(tmp_path: Path) -> None:
     for name in ("a.b.npz", "a_b.stl"):
         (tmp_path / name).touch()
     with pytest.raises(UserError, match=r"a\.b\.npz and a_b\.stl would have the same records"):

@@ -25,7 +25,7 @@ def test_a_stage_in_which_nothing_was_cut_is_no_list(tmp_path: Path) -> None:
     assert [rated.outcome.tolist() for rated in read_lists(tmp_path)] == [[0.3]]
 
 
-def test_records_of_other_terms_are_left_out_when_asked(tmp_path: Path) -> None:
+def test_records_of_other_terms_are_left_out_on_request(tmp_path: Path) -> None:
     for name in ("a.0.paper.npz", "a.0.ours.npz", "b.1.paper.npz"):
         write_record(tmp_path / name, OUTCOME)
     assert [entry.model for entry in read_lists(tmp_path, terms=("paper",))] == ["a", "b"]
@@ -54,7 +54,7 @@ def test_a_candidate_whose_node_was_not_expanded_is_censored(tmp_path: Path) -> 
     assert not whole.censored.any()
 
 
-def test_a_candidate_whose_node_was_expanded_and_never_cut_is_censored(tmp_path: Path) -> None:
+def test_a_candidate_with_an_expanded_but_never_cut_node_is_censored(tmp_path: Path) -> None:
     arrays = {"child": np.array([1, 2, 3]), "parent": np.array([0, 0, 1]), "node_expanded": np.array([True, True, True, False])}
     write_record(tmp_path / "a.0.x.npz", np.array([0.5, 0.3, 0.2]), **arrays)
     assert read_lists(tmp_path)[0].censored.tolist() == [False, True, True]

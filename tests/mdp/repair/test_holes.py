@@ -9,7 +9,7 @@ from mdp.repair.holes import triangulate_loop
 
 
 @given(st.integers(3, 30), st.integers(0, 2**32 - 1))
-def test_a_loop_in_a_plane_is_filled_with_its_own_area(corners: int, seed: int) -> None:
+def test_the_triangles_that_fill_a_planar_loop_have_its_area(corners: int, seed: int) -> None:
     random = np.random.default_rng(seed)
     turn = np.sort(random.uniform(0, 2 * np.pi, corners))
     radius = random.uniform(0.99, 1.0, corners)

@@ -247,7 +247,7 @@ def test_a_plane_that_nothing_can_complete_says_why() -> None:
         decompose(shapes.box(), "shape", _profile(), SearchRequest(plan=_by_hand((None, None))))
 
 
-def test_planes_by_hand_stay_and_the_others_are_found() -> None:
+def test_planes_by_hand_are_kept_and_the_others_are_found() -> None:
     arms, profile = _two_arms(), _profile()
     by_hand = _by_hand((LEANING, 28.25))
     both = decompose(arms, "shape", profile, SearchRequest(plan=by_hand))

@@ -229,7 +229,7 @@ def test_a_normal_of_any_length_is_a_direction(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("z", [1.0000000000001, 1.0000000000000002, 2.0])
-def test_a_plan_whose_normal_is_a_rounding_too_long_is_cut(tmp_path: Path, z: float) -> None:
+def test_a_plan_with_a_normal_that_is_too_long_is_cut(tmp_path: Path, z: float) -> None:
     (tmp_path / "mine.toml").write_text(f"{FIRST}[[part]]\nnormal = [0.0, 0.0, {z!r}]\noffset_mm = 5.0")
     decomposition = cut_by_plan(
         shapes.box(10.0, 10.0, 20.0), "box", load(), SearchRequest(plan=read_plan(tmp_path / "mine.toml"))

@@ -70,7 +70,7 @@ def test_a_plan_brings_back_the_same_limb(tmp_path: Path) -> None:
     assert list(map(planned_parts, plan.front)) == list(map(planned_parts, plan_of(again).front))
 
 
-def test_a_limb_by_hand_is_the_piece_above_the_plane_that_is_nearest_to_its_point() -> None:
+def test_a_limb_by_hand_is_the_piece_above_the_plane_nearest_to_its_point() -> None:
     mesh = shapes.bar_beside_a_tower()
     on_its_end = _by_hand(mesh, BAR).parts[1]
     on_its_side = _by_hand(mesh, replace(BAR, limbs_mm=((20.0, -6.0, 52.0),))).parts[1]
@@ -78,7 +78,7 @@ def test_a_limb_by_hand_is_the_piece_above_the_plane_that_is_nearest_to_its_poin
     assert on_its_end.mesh.bounds_mm[0, 2] == pytest.approx(48.0)
 
 
-def test_a_point_beside_every_piece_is_refused_with_its_distance() -> None:
+def test_a_point_outside_every_piece_is_refused_with_its_distance() -> None:
     with pytest.raises(PlanError, match="no piece above its plane lies at 27, 0, 70: the nearest one is 10 mm away"):
         _by_hand(shapes.bar_beside_a_tower(), replace(BAR, limbs_mm=((27.0, 0.0, 70.0),)))
 

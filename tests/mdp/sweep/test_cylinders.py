@@ -141,7 +141,7 @@ def test_an_oblique_cut_through_a_bore_has_the_set_cost_and_is_reported() -> Non
         assert "part 2: it is cut askew through a bore of 9 mm" in free.notes
 
 
-def test_a_cut_across_the_axis_of_a_bore_or_beside_it_costs_nothing_for_it() -> None:
+def test_a_cut_square_to_the_axis_of_a_bore_or_outside_it_does_not_cross_it() -> None:
     post = mesh_of(Solid.cube((24, 24, 60), True).translate((0, 0, 30)) - rod(9, 200))
     (bore,) = find_cylinders(post)
     assert not bore.is_crossed(Plane(np.array([0.0, 0.0, 1.0]), 30.0))

@@ -102,7 +102,7 @@ def test_a_void_belongs_to_the_limb_around_it() -> None:
     assert sum_limbs(_remainder(hollow), [plane], threshold(ANGLE_DEG), 0.0).volume_mm3[0] == pytest.approx(limbs.volume())
 
 
-def test_a_plane_reaches_the_faces_of_its_limb_and_those_below_it_but_none_of_the_other_limb() -> None:
+def test_a_plane_reaches_its_limb_and_faces_below_it_but_not_the_other_limb() -> None:
     mesh, plane = two_posts(), Plane(np.array([0.0, 0.0, 1.0]), 10.0, np.array([[-27.0, -2.0, 20.0]]))
     remainder = _remainder(mesh)
     cut_off, reached = limb_faces(remainder, plane), limb_reach(remainder, plane)

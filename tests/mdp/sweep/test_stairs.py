@@ -45,7 +45,7 @@ def test_the_sweep_counts_the_steps_of_every_face_above_a_plane(seed: int, place
 
 
 @pytest.mark.parametrize(("lean_deg", "steps"), [(0.0, 0.0), (0.5, 0.0), (2.0, cos(radians(2.0))), (45.0, 0.5**0.5), (90.0, 0.0)])
-def test_a_face_shows_no_steps_level_or_upright_and_the_highest_beside_level(lean_deg: float, steps: float) -> None:
+def test_steps_are_highest_on_nearly_level_faces_and_absent_on_level_and_upright_ones(lean_deg: float, steps: float) -> None:
     turn = radians(lean_deg)
     direction = np.array([[np.sin(turn), 0.0, np.cos(turn)]])
     top = Mesh(np.array([[0.0, 0, 0], [10, 0, 0], [0, 10, 0]]), np.array([[0, 1, 2]]))

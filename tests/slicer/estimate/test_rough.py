@@ -30,7 +30,7 @@ def test_a_box_is_walls_around_skin_at_its_ends_and_infill_between() -> None:
     assert sparse == pytest.approx(np.where(solid, 0.0, 0.2 * inside / SPACING))
 
 
-def test_a_ledge_half_way_up_has_skin_below_it() -> None:
+def test_a_step_halfway_up_has_skin_below_it() -> None:
     mesh = standing(m3.Manifold.cube((40, 40, 10)) + m3.Manifold.cube((20, 20, 20)))
     _, skin, _ = rough_lengths_mm(section_part(whole(mesh), PROFILE)).T
     assert np.flatnonzero(skin > 0.0).tolist() == [0, 1, 2, 3, 46, 47, 48, 49, 96, 97, 98, 99]
@@ -66,7 +66,7 @@ def test_alternating_layers_are_sampled_equally_often() -> None:
 
 
 @pytest.mark.parametrize(("raft_layers", "lowest"), [(0, 0), (3, 1)], ids=["on the plate", "on a raft"])
-def test_support_beside_the_first_layer_is_counted_with_the_raft_if_there_is_one(raft_layers: int, lowest: int) -> None:
+def test_support_next_to_the_first_layer_is_counted_with_any_raft(raft_layers: int, lowest: int) -> None:
     sections = section_part(whole(tee()), profile(f"process.raft_layers={raft_layers}"))
     lengths_mm = support_lengths_mm(own_supports(sections, find_overhangs(sections))).sum(axis=1)
     assert np.flatnonzero(lengths_mm)[0] == lowest

@@ -105,7 +105,7 @@ def portal(span: float) -> Mesh:
     return standing(posts + m3.Manifold.cube((12 + span, 10, 2)).translate((0, 0, 8)))
 
 
-def test_bridges_have_their_own_speed_and_flow_and_end_on_the_banks() -> None:
+def test_bridges_have_their_own_speed_and_flow_and_end_on_their_anchors() -> None:
     sliced = slice_part(whole(portal(5)), profile(*SOLID, "process.bridge_speed_mm_s=27", "process.bridge_flow=0.9"))
     beads = of_kind(sliced, Kind.BRIDGE)
     layer = next(layer for layer in sliced.layers if layer.is_of(Kind.BRIDGE).any())

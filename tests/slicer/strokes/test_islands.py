@@ -129,7 +129,7 @@ def test_a_travel_avoids_the_outer_wall_beside_an_interface_or_retracts() -> Non
     assert travels(since, near, notched, Polygons(), process, skin) == (np.array([False]), {})
 
 
-def test_a_short_hop_over_the_outer_wall_beside_an_interface_retracts() -> None:
+def test_a_short_travel_over_the_outer_wall_next_to_an_interface_retracts() -> None:
     gap = Polygons.square((8.0, 8.0)) + Polygons.square((8.0, 8.0)).translate((8.2, 0.0))
     skin = gap - offset(gap, -0.36)
     since, to = np.array([[7.5, 4.0]]), np.array([[8.7, 4.0]])

@@ -53,7 +53,7 @@ def test_the_stretch_beyond_the_bank_overhangs_and_nothing_is_lost() -> None:
     assert [len(row.approach) for row in rows_of(pieces)] == [1] + [0] * (len(pieces) - 1)
 
 
-def test_a_line_that_fills_a_gap_beside_a_bridge_overhangs_as_walls_do() -> None:
+def test_gap_fill_next_to_a_bridge_overhangs_like_walls() -> None:
     pieces = split(placed([(1, 5), (9, 5)], Kind.GAP), Polygons.square((10, 10)), Polygons.square((3, 10)))
     assert kinds(pieces) == [Kind.GAP, Kind.OVERHANG]
 

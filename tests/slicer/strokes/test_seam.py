@@ -134,7 +134,7 @@ def test_on_a_real_model_few_layers_break_the_line() -> None:
     assert np.median(jumps) < 0.25
 
 
-def test_inner_walls_begin_beside_their_outer_wall() -> None:
+def test_inner_walls_begin_next_to_the_start_of_their_outer_wall() -> None:
     layer = slice_part(whole(branch()), profile(*BARE, "process.layer_height_mm=0.4")).layers[10]
     outer = next(p for p in layer.paths if p.kind is Kind.OUTER_WALL)
     for wall in (p for p in layer.paths if p.kind is Kind.INNER_WALL):
@@ -179,7 +179,7 @@ def rim(radius: float, tilt: float, offset: float) -> Floats:
     return np.hstack([points[:-1], points[1:]])
 
 
-def test_first_layers_on_a_section_of_their_own_shape_begin_inside() -> None:
+def test_first_layers_on_a_section_of_the_same_shape_begin_inside() -> None:
     mesh = standing(m3.Manifold.cylinder(40, 8, 8, 96))
     base, top = cut(mesh, ((0, 0, 1), 20.0))
     layers = slice_part(top, profile(*BARE, "process.interface_seam_mm=0.5"), [base]).layers
@@ -197,7 +197,7 @@ def test_walls_of_a_tip_near_an_interface_begin_inside_it(loop: list[tuple[float
     assert shapely.Polygon(loop).buffer(1e-6).covers(shapely.LineString(bead.points))
 
 
-def test_first_layers_on_a_wider_part_begin_beside_it_when_they_reach_beyond() -> None:
+def test_first_layers_wider_than_the_part_below_begin_next_to_it() -> None:
     post = m3.Manifold.cube((10, 10, 10)) + m3.Manifold.cube((20, 10, 4)).translate((0, 0, 10))
     base, plate = cut(standing(post), ((0, 0, 1), 10.0))
     first = slice_part(plate, profile(*BARE, "process.seam=rear"), [base]).layers[0]

@@ -120,7 +120,7 @@ def test_a_part_in_front_of_a_wall_occludes_it() -> None:
     assert beside < alone - 0.15
 
 
-def test_a_flat_wall_gets_all_light_and_one_beside_an_inner_corner_half_of_it() -> None:
+def test_a_flat_wall_gets_all_light_and_one_near_an_inner_corner_gets_half() -> None:
     """At the corner of an infinite wall perpendicular to another, half of the light is lost near the corner (its view factor)."""
     ell = m3.Manifold.cube((100, 100, 100)) - m3.Manifold.cube((50, 50, 100)).translate((50, 50, 0))
     of = sections(whole(standing(ell)))

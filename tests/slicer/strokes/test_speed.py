@@ -35,7 +35,7 @@ def test_small_layers_are_blown_on_harder_than_large_ones() -> None:
     assert profile().material.fan_least <= large < 0.8
 
 
-def test_the_first_layers_on_the_platform_get_no_fan_and_of_those_on_plastic_only_the_first_one() -> None:
+def test_the_fan_is_off_in_the_first_layers_on_the_plate_but_only_in_the_first_on_plastic() -> None:
     chosen = profile("material.fan_off_layers=3")
     base, top = (slice_part(part, chosen) for part in cut(box(10, 10, 6), ((0.0, 0.0, 1.0), 3.0)))
     assert [layer.fan > 0 for layer in base.layers[:5]] == [False, False, False, True, True]

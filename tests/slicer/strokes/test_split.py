@@ -115,7 +115,7 @@ def test_beads_of_other_kinds_are_left_alone() -> None:
     assert within.tolist() == [False]
 
 
-def test_a_line_that_leaves_a_place_exactly_at_one_of_its_own_points_is_outside_from_there() -> None:
+def test_a_line_that_leaves_a_region_at_one_of_its_points_is_outside_from_there() -> None:
     corner = [3.307692304253578, 4.615384608507156]
     place = of_contours([np.array([[6.0, 4.0], [4.0, 6.0], corner, [6.0, 3.0]])])
     _, within = cut_line(np.array([[6.0, 4.0], corner, [1.3415410790929447, 3.2335858933747845]]), place)

@@ -27,7 +27,7 @@ def kinds(layers: Sequence[Layer]) -> set[Kind]:
     return {p.kind for lay in layers for p in lay.paths}
 
 
-def test_the_pedestal_is_all_support_and_the_model_has_none() -> None:
+def test_the_pedestal_consists_of_support_and_the_model_has_none() -> None:
     pedestal, model = lifted(box())
     assert kinds(pedestal) == PROPS
     assert not kinds(model) & PROPS
@@ -79,6 +79,6 @@ def test_support_beside_the_pedestal_is_on_the_build_plate() -> None:
     assert Kind.SUPPORT in kinds(model)
 
 
-def test_without_a_pedestal_nothing_changes() -> None:
+def test_a_box_without_a_pedestal_has_no_support() -> None:
     sliced = slice_part(whole(box(10, 10, 3)), profile())
     assert volume_mm3(sliced, Kind.SUPPORT, Kind.SUPPORT_INTERFACE) == 0

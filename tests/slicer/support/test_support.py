@@ -284,7 +284,7 @@ def test_a_foot_widens_support_to_twice_its_height_at_most(span: float, height: 
     assert wide.bounds[3] - narrow.bounds[3] == pytest.approx(np.clip(0.5 * lacking_mm, 0.0, 1.5), abs=0.12)
 
 
-def test_support_beside_a_slope_reaches_half_a_line_under_it() -> None:
+def test_support_next_to_a_slope_reaches_half_a_line_under_it() -> None:
     sides = ((-1, 0), (1, 0), (-3, 1.2), (3, 1.2), (-3, 4), (3, 4))
     slope = m3.Manifold.hull_points([(x, y, z) for x in (-20, 20) for y, z in sides])
     overhangs, supports = supported(whole(standing(slope)), "process.support_foot_mm=0")

@@ -34,10 +34,7 @@ export const figuresNow = () => {
 };
 
 /** Select a part and its plane, if any; 0: none. */
-export function choosePart(part) {
-  if (store.state.refused && part !== store.part) send({ do: "dismiss" }); // it was about another part
-  update({ part: part <= store.state.parts ? part : 0, hand: null });
-}
+export const choosePart = (part) => { if (store.state.refused && part !== store.part) send({ do: "dismiss" }); update({ part: part <= store.state.parts ? part : 0, hand: null }); };
 
 /** The part at a point of the build plate's frame. */
 export const partAt = (place) => planesNow().reduce((part, plane, k) => (dot(plane.normal, place) > plane.offset_mm ? k + 2 : part), 1);
