@@ -41,7 +41,8 @@ def three_digits(value: float, decimals: int = 2) -> str:
     """Format a measure with at most three significant digits and at most this many decimals: 9.45, 20.7, 125, 1230."""
     rounded = float(f"{value:.3g}")
     places = min(decimals, max(2 - floor(log10(abs(rounded))), 0)) if rounded else decimals
-    return f"{round(rounded, places) + 0.0:.{places}f}"  # a negative zero becomes 0
+    shown = value if abs(rounded) < 1000.0 else rounded  # rounded once: 5.749 is 5.7, but 5.75 would be 5.8
+    return f"{round(shown, places) + 0.0:.{places}f}"  # a negative zero becomes 0
 
 
 def is_phrase(name: str, message: str) -> bool:

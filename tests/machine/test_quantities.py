@@ -31,6 +31,7 @@ def test_an_amount_has_at_most_three_digits() -> None:
 
 def test_a_measure_with_a_sign_or_more_decimals_has_at_most_three_digits() -> None:
     assert [three_digits(value, 1) for value in (-0.04, -9.96, -123.4, 359.96)] == ["0.0", "-10.0", "-123", "360"]
+    assert [three_digits(value, 1) for value in (5.7499, 5.75, 44.4499)] == ["5.7", "5.8", "44.4"]
     assert [three_digits(value, 4) for value in (0.12345, 0.012345, 0.000012)] == ["0.123", "0.0123", "0.0000"]
 
 

@@ -183,7 +183,7 @@ export function onKeys(keys, closed) {
 }
 
 /** A measure with at most three significant digits and at most `most` decimals: 9.45, 20.7, 125, 1230. */
-export const threeDigits = (value, most = 2, rounded = Number(value.toPrecision(3))) => rounded.toFixed(rounded && Math.log10(Math.abs(rounded)) >= 2 - most ? Math.max(0, 2 - Math.floor(Math.log10(Math.abs(rounded)))) : most);
+export const threeDigits = (value, most = 2, rounded = Number(value.toPrecision(3))) => (Math.abs(rounded) < 1000 ? value : rounded).toFixed(rounded && Math.log10(Math.abs(rounded)) >= 2 - most ? Math.max(0, 2 - Math.floor(Math.log10(Math.abs(rounded)))) : most);
 export const mm2 = (area) => `${threeDigits(Math.max(area, 0), 1)} mm²`;
 export const clock = (seconds, form = {}) => new Date(1000 * seconds).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", ...form });
 
